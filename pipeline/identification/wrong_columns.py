@@ -396,7 +396,8 @@ class Gate:
         for group in [*((j,) for j in near), *every]:
             yield "position_sign", group, 1.0
             unknown = np.isnan(self.ratio[list(group)]).all()
-            for factor in (DEG, *(RATIOS if unknown else self._ratios(group))):
+            sides = [ratio**side for ratio in self._ratios(group) for side in (1, -1)]
+            for factor in (DEG, *(RATIOS if unknown else sides)):
                 yield "position_scale", group, factor
             if len(group) == 1:
                 yield from (("position_zero", group, zero) for zero in ZEROS)
@@ -420,8 +421,9 @@ class Gate:
         falls = np.log(np.maximum(before, FLOOR) / np.maximum(after, FLOOR))
         what = ""
         if cause == "position_scale":
-            motors = dict.fromkeys(self._ratios(joints), "it is that of the motor")
-            what = ({DEG: "it is in degrees"} | motors).get(size, "")
+            known = {ratio: "it is that of the motor" for ratio in self._ratios(joints)}
+            known |= {1.0 / ratio: "it is that of the joint" for ratio in known}
+            what = ({DEG: "it is in degrees"} | known).get(size, "")
         return Step(cause, joints, size, what, b, a, float(np.nansum(falls)))
 
     def _refined(self, start: Reading, before: Array, step: Step) -> Step:
@@ -585,9 +587,9 @@ def _finding(log: Recording, step: Step, last: Reading, judged: int) -> Finding:
     elif step.cause == "scale":
         words += ": else bodies are as many times heavier or lighter than the robot's file says"
         words += "" if step.what else ", or it is on the other side of a gear"
-    of = log.effort if step.cause in _OF_EFFORTS else log.position_quantity
-    every = len(step.joints) >= judged > 1
-    column = "" if every else column_name(log.joints[step.joints[0]], of)
+    joint, efforts = log.joints[step.joints[0]], step.cause in _OF_EFFORTS
+    own = column_name(joint, log.effort if efforts else log.position_quantity(joint))
+    column = "" if len(step.joints) >= judged > 1 else own
     detail = f"{words}; in a mapping file: {'; '.join(_lines(log, last, step))}"
     check = SIZE if step.cause == "scale" and not step.what else SUSPECTED
     return Finding(log.name, column, check, step.size, "1", "suspected", detail)
@@ -596,14 +598,14 @@ def _finding(log: Recording, step: Step, last: Reading, judged: int) -> Finding:
 def _lines(log: Recording, reading: Reading, step: Step) -> list[str]:
     """Rules of a mapping file for the columns that one step is about."""
     joints, efforts, out = log.joints, step.cause in _OF_EFFORTS, list[tuple[str, str]]()
-    own = log.effort if efforts else log.position_quantity
+    own = log.effort if efforts else log.position_quantity(joints[step.joints[0]])
     for j in sorted(step.joints):
         effort, factor, late, position, scale, zero = reading[j].tolist()
         if efforts or step.cause == "both_exchanged":
             out.append(_line(log, log.effort, joints[effort], joints[j], (factor, 0.0, late)))
         if not efforts:
-            change = scale, zero, 0.0
-            out.append(_line(log, own, joints[position], joints[j], change))
+            source, change = joints[position], (scale, zero, 0.0)
+            out.append(_line(log, log.position_quantity(source), source, joints[j], change))
     ending, alike = column_name("", own), {keys for _, keys in out}
     if len(alike) == 1 and 1 < len(out) == len(joints) and all(c.endswith(ending) for c, _ in out):
         out = [(column_name("*", own), alike.pop())]

@@ -95,7 +95,7 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], Recording]
     for j, joint in enumerate(log.joints):
         q, x = log.position_of(joint), log.column(joint, log.effort)
         x = np.full(len(log), np.nan) if x is None else x
-        column = column_name(joint, log.position_quantity)
+        column = column_name(joint, log.position_quantity(joint))
         if not np.isfinite(q).any():
             detail = f"holds no number at all, and its {log.effort} does: where did it move?"
             found.note(column, "empty", 1, "1", "refused", detail)
@@ -175,14 +175,14 @@ def _silent(log: Recording, joint: str, q: Array, x: Array, found: Findings) -> 
     seen = f"{', '.join(f'{v:.6g}' for v in values[:_FEW_VALUES])} {log.unit}"
     verdict, quantity, silent = "warning", log.effort, True
     if joint in log.left_out:
-        check, why, quantity = "left_out", log.left_out[joint], log.position_quantity
+        check, why, quantity = "left_out", log.left_out[joint], log.position_quantity(joint)
     elif values.size == 0:
         check, why = "empty", "holds no number at all: the joint is left out"
     elif still and values.size == 1:
-        check, verdict, quantity = "constant", "masked", log.position_quantity
+        check, verdict, quantity = "constant", "masked", log.position_quantity(joint)
         why = "position and effort never change: the joint is left out"
     elif still:
-        check, silent, quantity = "still", False, log.position_quantity
+        check, silent, quantity = "still", False, log.position_quantity(joint)
         why = f"never changes while its {log.effort} does: it stood still, or its sensor is dead"
     elif values.size <= _FEW_VALUES:
         check = "constant"
@@ -196,7 +196,10 @@ def _silent(log: Recording, joint: str, q: Array, x: Array, found: Findings) -> 
 def _limits(log: Recording, expected: Expected, ok: Mask, found: Findings) -> None:
     """Good positions (N, J) against the limits of the joints, efforts against those of drives."""
     for j, joint in enumerate(log.joints):
-        q, column = log.position_of(joint)[ok[:, j]], column_name(joint, log.position_quantity)
+        q, column = (
+            log.position_of(joint)[ok[:, j]],
+            column_name(joint, log.position_quantity(joint)),
+        )
         low, high = float(expected.lower[j]), float(expected.upper[j])
         detail = f"runs from {q.min():.4g} to {q.max():.4g} rad, the joint's limits are "
         detail += f"{low:.4g} to {high:.4g} rad: "

@@ -368,7 +368,7 @@ def _seen(log: Log, settings: Settings) -> list[Finding]:
             f"{LEAST_CUTOFF:g} Hz, as a robot's motion needs, show the steps alone; log positions "
             "with more digits, or the velocity beside them"
         )
-        column = column_name(log.joints[j], read.position_quantity)
+        column = column_name(log.joints[j], read.position_quantity(log.joints[j]))
         found.note(column, "resolution", rate, "Hz", "refused", detail)
     return found
 

@@ -252,10 +252,11 @@ class Recording:
         """Shape (N, J) [rad]."""
         return self.frame[[column_name(joint, "position") for joint in self.joints]].to_numpy()
 
-    @property
-    def position_quantity(self) -> str:
-        """Key of the position's columns in the log format."""
-        return "motor_position" if self.at_motor else "position"
+    def position_quantity(self, joint: str) -> str:
+        """Of the column that a joint's position was read from."""
+        sides = ("position", "motor_position")
+        read = [side for side in sides if column_name(joint, side) in self.rules]
+        return read[0] if read else sides[self.at_motor]
 
     @property
     def unit(self) -> str:

@@ -128,6 +128,14 @@ def test_exchanged_torques_are_named_where_other_bodies_nearly_explain_them(urdf
     assert "the torques of j0 and j1 are exchanged" in found.detail
 
 
+def test_a_motors_position_that_is_the_joints_is_told_by_its_gear(urdf, tmp_path):
+    log, gear = logged(3, off=0.2, payload=0.3), "[gear_ratio]\nj2 = 50\n"
+    log = log.rename(columns={"j2__position_rad": "j2__motor_position_rad"})
+    (found,) = judged(log, urdf, tmp_path, gear)
+    assert "it is that of the joint" in found.detail
+    assert judged(log, urdf, tmp_path, f"{found.detail.partition('file: ')[2]}\n{gear}") == []
+
+
 def dragged(log: pd.DataFrame) -> None:
     for j in range(3):
         v = np.gradient(
