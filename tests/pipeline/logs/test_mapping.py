@@ -15,13 +15,6 @@ Array = NDArray[np.float64]
 Read = Callable[..., Recording]
 
 
-def effort_of(log: Recording) -> Array:
-    """Of the compared channel."""
-    effort = log.of(log.effort)
-    assert effort is not None
-    return effort
-
-
 def test_rename_scale_flip_zero_and_unit(columns, read):
     foreign = {"t": 1e3 * columns["time_s"]}
     foreign["enc_shoulder"] = 90.0 - np.degrees(columns["a__position_rad"])
@@ -52,8 +45,8 @@ def test_rename_scale_flip_zero_and_unit(columns, read):
     assert log.time == pytest.approx(columns["time_s"])
     assert log.position[:, 0] == pytest.approx(columns["a__position_rad"], abs=1e-12)
     assert log.effort == "current"
-    assert effort_of(log)[:, 0] == pytest.approx(columns["a__torque_Nm"])
-    assert effort_of(log)[:, 1] == pytest.approx(columns["b__torque_Nm"])
+    assert log.of(log.effort)[:, 0] == pytest.approx(columns["a__torque_Nm"])
+    assert log.of(log.effort)[:, 1] == pytest.approx(columns["b__torque_Nm"])
 
 
 def test_what_holds_for_some_logs_and_rows_with_the_drive_off(columns, read):
@@ -139,7 +132,7 @@ def targets(columns: Columns) -> Columns:
 
 def test_the_law_gives_back_the_torque_that_was_asked_for(targets, columns, read, two_joints):
     log = read(targets, GAINS)
-    torque = effort_of(log)
+    torque = log.of(log.effort)
     for j, joint in enumerate("ab"):
         assert np.allclose(torque[:, j], columns[f"{joint}__torque_Nm"], atol=1e-9)
     assert log.derived == {"torque": "kp (goal - position) + kd (0 - velocity)"}
