@@ -16,9 +16,9 @@ import numpy as np
 from pipeline.effects.base import EVERY
 from pipeline.effects.bodies import AXES, RigidBodyParameters
 from pipeline.effects.drivetrain import FrictionFactor
+from pipeline.identification.residual import WHOLE
 from pipeline.identification.results import INDISTINGUISHABLE, UNEXPLAINED
 from pipeline.identification.supply import account
-from pipeline.identification.where import WHOLE
 from pipeline.identification.workflow.changed import BODY
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.simulation.walk_stand import IDEAL

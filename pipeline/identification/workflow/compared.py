@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, Strict
 from actuators.arrays import Array
 from actuators.checked import Number, Table, checked
 from actuators.errors import LegwattError
-from pipeline.identification.where import rows_left, shrunk, where
+from pipeline.identification.residual import rows_left, shrunk, where
 from pipeline.identification.wrong_columns import wrong_columns
 from pipeline.logs.formats import is_log
 from pipeline.logs.load import Asked, Logs, load, without_useless

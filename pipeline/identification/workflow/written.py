@@ -16,9 +16,8 @@ import numpy as np
 from actuators.arrays import Array
 from pipeline.effects.base import effect_named
 from pipeline.effects.model_file import Edit, apply_edits
-from pipeline.identification.residual import floor_of, residuals
+from pipeline.identification.residual import floor_of, gap_of, residuals
 from pipeline.identification.results import IDLE_NAME, NOTHING, SUSPECTED, Found, Residual, named
-from pipeline.identification.where import gap_of
 from pipeline.logs.log import TEST, VALIDATION, Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator

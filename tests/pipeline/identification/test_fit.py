@@ -12,11 +12,10 @@ from pipeline.identification.answer import Told, answered, identify
 from pipeline.identification.design import make_data_sets, make_design
 from pipeline.identification.fit import NOTHING, independent, settled, start_fit
 from pipeline.identification.offered import block_terms, name_terms, reversals
-from pipeline.identification.residual import floor_of, residuals
+from pipeline.identification.residual import floor_of, residuals, rows_left, shrunk
 from pipeline.identification.results import Found
 from pipeline.identification.search import about, searched
 from pipeline.identification.tolerances import STRAINS, BodyStrain
-from pipeline.identification.where import rows_left, shrunk
 from pipeline.identification.workflow.written import may_be_nothing
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.logs.reduce import DRIVE_OFF, INSTEAD, NO_EFFORT
