@@ -18,7 +18,7 @@ from actuators.loading.data_sheet import ENTRIES
 from pipeline.commands.main import AddVerb, add_verbose_option, given_options, named_path
 from pipeline.dynamics.joint_demand import check_gait
 from pipeline.machine.own_actuators import Motors
-from pipeline.robot.check import Finding, check_robot, check_urdf, together
+from pipeline.robot.check import Finding, check_robot, check_second_reader, check_urdf, together
 from pipeline.robot.guess import Guess, guesses, robot_text
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file, loaders, robot_source, spec_of
@@ -129,9 +129,10 @@ def check(file: str | Path) -> Checked:
     path = Path(file)
     if path.suffix.lower() != ".toml":
         text = read_urdf(robot_source(str(path)).urdf)
-        return Checked(check_urdf(text, str(path)))
+        return Checked((*check_urdf(text, str(path)), check_second_reader(text, str(path))))
     robot = load_robot(load_robot_file(path))
-    return Checked((*check_robot(robot), *check_gait(robot)))
+    second = check_second_reader(robot.urdf, robot.spec.name)
+    return Checked((*check_robot(robot), second, *check_gait(robot)))
 
 
 @dataclass(frozen=True)

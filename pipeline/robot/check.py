@@ -15,6 +15,7 @@ negative moment is one even where the sum hides it.
 8. total mass against what the robot file states.
 """
 
+import io
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -24,13 +25,15 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
-from actuators.errors import LegwattError, some
+from actuators.errors import LegwattError, one_line, some
 from pipeline.robot.robot import Robot
 from pipeline.robot.urdf import MOVING, model_of_angles, parse_elements, parse_urdf
 
 #: Of the stated mass, where the robot file gives no interval: masses are stated in three digits.
 MASS_TOLERANCE = 0.005
 _SHOWN = 3  # subjects that one line names
+#: By which two placements may differ: rounding of both readers, in lengths of a metre and radians.
+_ALIKE, _POSTURES = 1e-6, 5
 #: Excess over what is possible that is rounding, relative to the largest principal moment.
 TRIANGLE_TOLERANCE = 1e-6
 #: A link's inertia counts from this share of the largest moment of the body it merges into.
@@ -230,6 +233,43 @@ def check_robot(robot: Robot) -> list[Finding]:
 def source_of(robot: Robot) -> str:
     """The file to correct: the robot file where the URDF is built from it."""
     return str(robot.spec.path if robot.spec.robot.build else robot.spec.urdf)
+
+
+def check_second_reader(urdf: str, where: str) -> Finding:
+    """Whether yourdfpy puts every link where Pinocchio does, in postures drawn at random.
+
+    Two parsers that share no code rarely read an axis or an order of angles wrongly in the same
+    way. A joint that mimics another is moved like any other.
+
+    `urdf`: its text. `where`: its file, for the finding.
+    """
+    import yourdfpy
+
+    name, draw = "read alike by a second reader", np.random.default_rng(0)
+    try:
+        text = io.BytesIO(urdf.encode())
+        read = yourdfpy.URDF.load(text, build_scene_graph=False, load_meshes=False).robot
+        for joint in read.joints:
+            joint.mimic = None
+        other = yourdfpy.URDF(read, build_scene_graph=True, load_meshes=False)
+        model = pin.buildModelFromXML(urdf)
+        data, neutral = model.createData(), pin.neutral(model)
+        for _ in range(_POSTURES):
+            names, velocity = other.actuated_joint_names, np.zeros(model.nv)
+            turn = draw.uniform(-1.0, 1.0, len(names))
+            velocity[[model.joints[model.getJointId(joint)].idx_v for joint in names]] = turn
+            pin.framesForwardKinematics(model, data, pin.integrate(model, neutral, velocity))
+            other.update_cfg(turn)
+            for frame, place in zip(model.frames, data.oMf, strict=True):
+                if frame.type != pin.FrameType.BODY:
+                    continue
+                if np.abs(place.homogeneous - other.get_transform(frame.name)).max() > _ALIKE:
+                    detail = f"link '{frame.name}' lies elsewhere for Pinocchio than for yourdfpy"
+                    return Finding(where, name, False, detail)
+    except Exception as error:  # of a library that reads what another one refused to
+        detail = f"one of the two cannot read it ({one_line(error)[:80]})"
+        return Finding(where, name, True, detail, note=True)
+    return Finding(where, name, True, f"{len(read.links)} links in {_POSTURES} postures")
 
 
 def refused(findings: Sequence[Finding], where: str, *, tolerant: bool = False) -> tuple[str, ...]:

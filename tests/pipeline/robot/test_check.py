@@ -4,14 +4,13 @@ import io
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
 import pinocchio as pin
 import pytest
 import yourdfpy
 
 import pipeline as lw
 from actuators.errors import LegwattError
-from pipeline.robot.check import Finding, check_robot, check_urdf, refused
+from pipeline.robot.check import Finding, check_robot, check_second_reader, check_urdf, refused
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.urdf import build_urdf
 
@@ -212,19 +211,22 @@ KINDS = """<robot name="arm">
 </robot>"""
 
 
-def test_a_second_reader_places_every_link_alike(root):
-    """Two parsers that share no code rarely read an axis or an order of angles wrongly alike."""
-    for text in (KINDS, *((root / "urdf" / f"{n}.urdf").read_text() for n in ("leg", "tytan"))):
-        other = yourdfpy.URDF.load(io.BytesIO(text.encode()), load_meshes=False)
-        model, names = pin.buildModelFromXML(text), other.actuated_joint_names
-        data = model.createData()
-        velocity, turn = np.zeros(model.nv), np.linspace(-0.9, 0.8, len(names))
-        velocity[[model.joints[model.getJointId(name)].idx_v for name in names]] = turn
-        pin.framesForwardKinematics(model, data, pin.integrate(model, pin.neutral(model), velocity))
-        other.update_cfg(turn)
-        for frame, place in zip(model.frames, data.oMf, strict=True):
-            if frame.type == pin.FrameType.BODY:
-                assert np.abs(place.homogeneous - other.get_transform(frame.name)).max() < 1e-9
+@pytest.mark.parametrize(
+    ("old", "new", "alike"),
+    [
+        ("", "", True),
+        ('rpy="0.3 -0.2 0.7"', 'rpy="0.3 -0.2 0.70001"', False),
+        ('rpy="0.3 -0.2 0.7"', 'rpy="0.3 -0.2 0.70000001"', True),  # rounding
+        ('axis xyz="0 0 1"', 'axis xyz="0 0 -1"', False),
+    ],
+)
+def test_what_one_of_them_reads_otherwise_is_named(monkeypatch, old, new, alike):
+    load = yourdfpy.URDF.load
+    read = io.BytesIO(KINDS.replace(old, new).encode())
+    monkeypatch.setattr(yourdfpy.URDF, "load", lambda _, **options: load(read, **options))
+    found = check_second_reader(KINDS, "arm.urdf")
+    assert (found.passed, found.note) == (alike, False)
+    assert ("lies elsewhere" in found.detail) is not alike
 
 
 ROBOTS = ["hexapod.toml", "hexapod_axis90.toml", "leg.toml"]
