@@ -99,10 +99,7 @@ def own_robot(root: Path, folder: Path, pattern: str, replacement: str) -> Path:
 
 
 def as_compared(
-    *logs: Path,
-    robot: Path | None = None,
-    actuators: Path | None = None,
-    **options: Any,
+    *logs: Path, robot: Path | None = None, actuators: Path | None = None, **options: Any
 ) -> tuple[Order, Machine]:
     """What `gap` is asked, and the machine as it compares it with the logs."""
     order = Order.of(logs=logs, **options)

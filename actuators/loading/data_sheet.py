@@ -76,7 +76,7 @@ _NEEDED: Final = (
 
 #: What the rest or the range of a class gives (`filled`), so that it is asked for last.
 _GIVEN: Final = {
-    *("no_load_current", "rotor_inertia", "gear_efficiency", "continuous_current", "peak_current"),
+    *("no_load_current", "rotor_inertia", "gear_efficiency", "continuous_current", "peak_current")
 }
 
 

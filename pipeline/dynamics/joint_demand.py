@@ -45,11 +45,7 @@ class JointDemand:
 
 
 def segment_demand(
-    robot: Robot,
-    segment: Segment,
-    *,
-    forces: GroundForces = PAPER,
-    quasi_static: bool = False,
+    robot: Robot, segment: Segment, *, forces: GroundForces = PAPER, quasi_static: bool = False
 ) -> tuple[JointDemand, ContactForces | None]:
     """Joint torques over one segment, with the contact forces they rest on.
 
@@ -123,11 +119,7 @@ class MotionDemand:
 
 
 def motion_demand(
-    robot: Robot,
-    motion: Motion,
-    *,
-    forces: GroundForces = PAPER,
-    quasi_static: bool = False,
+    robot: Robot, motion: Motion, *, forces: GroundForces = PAPER, quasi_static: bool = False
 ) -> MotionDemand:
     """Joint demand along a motion; see `segment_demand`."""
     parts = [

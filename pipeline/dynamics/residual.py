@@ -179,12 +179,7 @@ def _beside_base(model: pin.Model, legs: LegChains, joints: Index, columns: Arra
 
 
 def sole_covariance(
-    model: pin.Model,
-    legs: LegChains,
-    joints: Index,
-    q: Array,
-    force: Array,
-    offset: float,
+    model: pin.Model, legs: LegChains, joints: Index, q: Array, force: Array, offset: float
 ) -> Array:
     """Covariance of r by not knowing where on its sole a foot stands, shape (N, nv, nv).
 

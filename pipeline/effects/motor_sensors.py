@@ -174,10 +174,7 @@ class ParallelSpring(Effect):
 
     name = "parallel_spring"
     additive = True
-    parameters = (
-        Parameter("stiffness", "N*m/rad", -1e4, 1e4),
-        Parameter("rest", "rad", -1e3, 1e3),
-    )
+    parameters = (Parameter("stiffness", "N*m/rad", -1e4, 1e4), Parameter("rest", "rad", -1e3, 1e3))
     coordinates = (
         Coordinate("stiffness", 1e-2, Size(1.0, "torque/travel", _ALL), signed=True),
         Coordinate("preload", 1e-2, Size(1.0, "torque", _ALL), signed=True, required=False),

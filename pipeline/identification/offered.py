@@ -47,10 +47,7 @@ _STATED_FRICTION: Final = 0.005
 _STATED_MOST: Final = 0.05
 _BODY_MOST: Final = 0.01
 #: Multiples of the small steps across which a column looks where the prediction bends.
-_REACHES: Final = {
-    "time_delay": (1.0, 20.0, 100.0),
-    "joint_elasticity": (1.0, 100.0, 600.0),
-}
+_REACHES: Final = {"time_delay": (1.0, 20.0, 100.0), "joint_elasticity": (1.0, 100.0, 600.0)}
 #: Place of a delay that all joints share.
 EVERY_CHANNEL: Final = ("effort channels",)
 #: Orders of a ripple that compete at a joint.

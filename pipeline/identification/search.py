@@ -76,11 +76,7 @@ _FORESEEN: Final = (0.02, 0.1)
 Move = tuple[float, tuple[int, ...], frozenset[str]]
 
 
-def searched(
-    model: MachineModel,
-    data_sets: Sequence[DataSet],
-    floor: Array,
-) -> Fit:
+def searched(model: MachineModel, data_sets: Sequence[DataSet], floor: Array) -> Fit:
     """The likeliest set of names.
 
     Args:

@@ -151,10 +151,7 @@ class Settings:
 
 
 def choose_settings(
-    logs: Sequence[Recording],
-    *,
-    cutoff: float | None = None,
-    thinned: bool = True,
+    logs: Sequence[Recording], *, cutoff: float | None = None, thinned: bool = True
 ) -> Settings:
     """Choose one grid and one cut-off for several logs, by their good positions and efforts.
 

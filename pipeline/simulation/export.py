@@ -267,12 +267,7 @@ def _torque(a: Chain, v: Array, acceleration: float = 0.0) -> Array:
     return np.asarray(whole.at_motor(side).torque[:, 0] * a.ratio)
 
 
-def mjcf(
-    machine: MachineModel,
-    root: Element,
-    numbers: Mapping[str, Numbers],
-    comment: str,
-) -> str:
+def mjcf(machine: MachineModel, root: Element, numbers: Mapping[str, Numbers], comment: str) -> str:
     """A MuJoCo model: its URDF's bodies and joints, driven by torque without a gain.
 
     MuJoCo writes numbers with six digits. `root`: of the URDF with friction and bodies in it.

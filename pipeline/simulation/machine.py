@@ -22,11 +22,7 @@ from actuators.errors import LegwattError, closest, known, one_line, some
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from actuators.parameters import dimension, quantity, to_si
 from pipeline.dynamics.contact_forces import GroundForces
-from pipeline.dynamics.joint_demand import (
-    JointDemand,
-    motion_demand,
-    segment_demand,
-)
+from pipeline.dynamics.joint_demand import JointDemand, motion_demand, segment_demand
 from pipeline.effects.base import effect_named, place_text
 from pipeline.effects.model_file import (
     Edit,
@@ -63,14 +59,7 @@ from pipeline.robot.robot_file import (
     leg_list,
 )
 from pipeline.robot.urdf import MOVING, parse_elements
-from pipeline.simulation.walk_stand import (
-    IDEAL,
-    USUAL,
-    Demand,
-    Standing,
-    Walking,
-    WalkOptions,
-)
+from pipeline.simulation.walk_stand import IDEAL, USUAL, Demand, Standing, Walking, WalkOptions
 
 if TYPE_CHECKING:
     from collections.abc import Callable

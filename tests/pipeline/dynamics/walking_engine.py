@@ -146,10 +146,7 @@ def spec_of(root: ET.Element, robot: Robot, *, balanced: bool) -> mujoco.MjSpec:
 
 
 def _model(
-    robot: Robot,
-    payload: tuple,
-    coulomb: dict[str, float],
-    gains: tuple[float, float],
+    robot: Robot, payload: tuple, coulomb: dict[str, float], gains: tuple[float, float]
 ) -> mujoco.MjModel:
     root = ET.fromstring(robot.urdf)
     _possible(root)

@@ -28,14 +28,10 @@ TIBIA, SHARE = "rm_tibia_link", 0.02
 def edit(effect: str, place: str, values: dict[str, float]) -> Edit:
     """As a first log would have shown it, known to two per cent."""
     units = {p.name: p.unit for p in EFFECTS[effect].parameters}
-    rows = {
-        name: {
-            "value": x,
-            "unit": units[name],
-            "interval": (x - SHARE * abs(x) - 1e-6, x + SHARE * abs(x) + 1e-6),
-        }
-        for name, x in values.items()
-    }
+    rows = dict[str, dict[str, object]]()
+    for name, x in values.items():
+        ends = (x - SHARE * abs(x) - 1e-6, x + SHARE * abs(x) + 1e-6)
+        rows[name] = {"value": x, "unit": units[name], "interval": ends}
     return Edit.model_validate({"effect": effect, "place": (place,), "parameters": rows})
 
 

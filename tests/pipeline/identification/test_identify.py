@@ -36,10 +36,7 @@ HIDDEN = {
     ),
     "parallel_spring": (("rm_joint_1",), {"stiffness": 2.0, "rest": 0.1}),
     "torque_constant_error": (J2, {"relative": -0.12}),
-    "winding_heating": (
-        J2,
-        {"rise": 40.0, "thermal_resistance": 6.0, "time_constant": 4.0},
-    ),
+    "winding_heating": (J2, {"rise": 40.0, "thermal_resistance": 6.0, "time_constant": 4.0}),
     "warming_friction": (J2, {"coulomb": 0.02, "viscous": 0.03, "reference": 308.15}),
     "effort_offset": (J2, {"offset": 0.05}),
     "effort_gain": (("rm_joint_2__current_A",), {"gain": 1.3}),

@@ -48,10 +48,7 @@ def degrees_and_milliseconds(columns: Columns) -> Columns:
     return {"t": 1e3 * columns["time_s"]} | out
 
 
-@pytest.mark.parametrize(
-    "disguise",
-    [plotjuggler, ur_style, degrees_and_milliseconds],
-)
+@pytest.mark.parametrize("disguise", [plotjuggler, ur_style, degrees_and_milliseconds])
 def test_a_disguised_log_is_read_as_what_it_is(disguise, columns, write, two_joints, tmp_path):
     nothing = {"q_7": np.full(2000, np.nan)}  # no joint of anything
     path = write(disguise(columns) | nothing, "foreign.csv")

@@ -111,9 +111,7 @@ def test_holding_elsewhere_in_the_friction_band_moves_the_break_even(rows, part,
     even = rows[0].break_even
     extra = even / (1 - even) * printed_leg(held.power).sum()
     for row, torque in zip(
-        of(rows, "friction band"),
-        (np.abs(held.low + held.high) / 2, most),
-        strict=True,
+        of(rows, "friction band"), (np.abs(held.low + held.high) / 2, most), strict=True
     ):
         watts = printed_leg((torque / motor.torque_constant) ** 2 * motor.resistance).sum()
         assert row.break_even == pytest.approx(extra / (extra + watts), rel=1e-2)

@@ -132,8 +132,7 @@ def test_inertia_is_that_of_a_body(moments, products, wrong):
 
 
 @pytest.mark.parametrize(
-    ("moments", "goes_on"),
-    [((0.02, 0.03, 0.09), True), ((-0.001, 0.03, 0.02), False)],
+    ("moments", "goes_on"), [((0.02, 0.03, 0.09), True), ((-0.001, 0.03, 0.02), False)]
 )
 def test_an_inertia_beyond_the_triangle_stops_all_but_a_comparison_with_a_log(moments, goes_on):
     found = judged(*on_arm(link("b", moments=moments)))

@@ -33,11 +33,7 @@ SUPPLY, GAIN = 7.0, 0.6
 
 def machine(*friction: Friction, **changes: object) -> MachineModel:
     """The pendulum behind a gear of 30, friction at the joint."""
-    elements = (
-        *friction,
-        Ratio(name="gear", ratio=RATIO),
-        Inertia(name="rotor", inertia=ROTOR),
-    )
+    elements = (*friction, Ratio(name="gear", ratio=RATIO), Inertia(name="rotor", inertia=ROTOR))
     motor = DCMotor("winding", CONSTANT, RESISTANCE)
     model = read_machine(URDF).model
     return model.with_actuator(Chain(JOINT, elements, motor, **changes))  # type: ignore[arg-type]
@@ -81,8 +77,7 @@ def test_another_integrator_gives_the_same_motion():
 def test_load_friction_forward_is_its_inverse():
     """Along a driven motion the chain, asked backward, needs the motor's torque."""
     model = machine(
-        Friction("load", load=0.35, coulomb=0.01),
-        Friction("s", excess=0.02, stribeck_speed=0.3),
+        Friction("load", load=0.35, coulomb=0.01), Friction("s", excess=0.02, stribeck_speed=0.3)
     )
     servo = driven(lambda t: np.asarray(1.2 * np.sin(3.0 * t)), seconds=2.0)
     run = ForwardSimulator(model).run(servo)

@@ -277,10 +277,7 @@ def test_what_is_no_motion_is_refused_with_one_line(hexapod, moved, tmp_path):
         (moved.rename(columns={"lm__contact": "lm__contakt"}), "did you mean 'lm__contakt'"),
         (moved.assign(base__roll_rad=0.0), "columns base__roll_rad alone"),
         (moved[:5], "5 rows; derivatives need 6"),
-        (
-            moved.assign(**np.degrees(moved[angles])),
-            "deg; .* in degrees they would fit",
-        ),
+        (moved.assign(**np.degrees(moved[angles])), "deg; .* in degrees they would fit"),
     ]
     for column, rows, value, words in WRONG:
         other = moved.astype({column: object})

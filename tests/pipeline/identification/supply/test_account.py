@@ -13,12 +13,7 @@ from numpy.typing import NDArray
 
 import pipeline as lw
 from actuators.errors import LegwattError
-from pipeline.identification.supply.account import (
-    MEASURED,
-    UNEXPLAINED,
-    account,
-    rows_of,
-)
+from pipeline.identification.supply.account import MEASURED, UNEXPLAINED, account, rows_of
 from pipeline.identification.supply.drives import DrivePower, supply_samples
 from pipeline.identification.supply.fit import OWN, TERMS, Fit
 from pipeline.identification.workflow.compared import load_logs
