@@ -41,9 +41,12 @@ from pipeline.identification.settings import (
     COLOURED,
     COVER,
     EXCLUDED,
+    FAR_BEHIND,
+    LARGEST_CLASS,
     LAW,
     LOOSE,
     SHARE,
+    SHARED,
     SURE,
     TWIN,
 )
@@ -60,16 +63,10 @@ _SEED: Final = 20240613
 _RIVALS: Final = 4
 #: Rivals of a name of the search that are estimated whatever is foreseen of them.
 _TRIED: Final = 4
-#: Share of a name's torque from which on another's columns may be a twin's, made anew.
-_ALIKE: Final = 0.9
 #: Times that columns are made anew about a rival.
 _ABOUT: Final = 3
-#: Evidence that columns about where a rival lies may still bring it (logarithm).
-_FAR_BEHIND: Final = 200.0
 #: Times that a rival that turns out likelier is followed.
 _FOLLOWED: Final = 2
-#: Names that may stand in the place of one, so that a class has three members.
-_LARGEST_CLASS: Final = 2
 #: Of what does not stand, one in so many goes before the rest is judged anew.
 _SLOWLY: Final = 4
 #: Laws of friction of which any curve over the speed has a part.
@@ -368,7 +365,7 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
     less = settled(replace(less, loose=frozenset()) if bodies else less.lacking(one.terms), 5)
     out: list[Rival] = []
     likely, alike = _foreseen(less, fit, one)
-    for move, far in [*((m, _FAR_BEHIND) for m in likely), *((m, np.inf) for m in alike)]:
+    for move, far in [*((m, FAR_BEHIND) for m in likely), *((m, np.inf) for m in alike)]:
         added = [k for k in move[1] if k not in names]
         key = d.terms[added[0]].key if added else BODIES
         if any(r.key == key for r in out):
@@ -395,7 +392,7 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
     if bodies:
         out += _traded(less, fit)
     out.sort(key=lambda r: r.behind)
-    open_ = [r for r in out if not r.excluded][:_LARGEST_CLASS]
+    open_ = [r for r in out if not r.excluded][:LARGEST_CLASS]
     return [r for r in out if r.excluded or r in open_]
 
 
@@ -445,7 +442,7 @@ def _foreseen(less: Fit, fit: Fit, one: Told) -> tuple[list[Move], list[Move]]:
         wide = replace(less, loose=less.loose | {block}, scales={**less.scales, block: LOOSE})
         share = 1.0 - wide.beside(columns, x) / less.beside(columns, x)
         twins.append((share, less.names, wide.loose))
-    twins = sorted((m for m in twins if m[0] > _ALIKE), key=lambda m: -m[0])
+    twins = sorted((m for m in twins if m[0] > SHARED), key=lambda m: -m[0])
     return likely, twins[:_RIVALS]
 
 

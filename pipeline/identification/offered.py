@@ -23,7 +23,14 @@ from pipeline.effects.motor_sensors import (
 )
 from pipeline.identification.design import DataSet, Design, Term, make_design
 from pipeline.identification.fit import Fit, independent
-from pipeline.identification.settings import MARGIN, TIGHT
+from pipeline.identification.settings import (
+    BODY_MOST,
+    MARGIN,
+    RESISTANCE,
+    STATED_FRICTION,
+    STATED_MOST,
+    TIGHT,
+)
 from pipeline.identification.tolerances import (
     STRAINS,
     BodyStrain,
@@ -39,13 +46,6 @@ COMMON: Final = (
     *("viscous_friction", "coulomb_friction", "load_dependent_friction"),
     *("rotor_inertia", "effort_offset"),
 )
-#: Of a winding and of friction, where their files state no wider interval [1].
-_RESISTANCE: Final = 0.02
-_STATED_FRICTION: Final = 0.005
-#: What a log left open at most of friction and bodies that it showed [1]: what moves further is
-#: told, or a thing that was mounted would be shared out over links that the first log left open.
-_STATED_MOST: Final = 0.05
-_BODY_MOST: Final = 0.01
 #: Multiples of the small steps across which a column looks where the prediction bends.
 _REACHES: Final = {"time_delay": (1.0, 20.0, 100.0), "joint_elasticity": (1.0, 100.0, 600.0)}
 #: Place of a delay that all joints share.
@@ -80,7 +80,7 @@ def block_terms(
     for link, joint in model.robot.links.items():
         if observable(model, m, joint):
             unit = tuple(STRAINS.values())
-            bound = float(np.clip(model.known.get(link, TIGHT), TIGHT, _BODY_MOST))
+            bound = float(np.clip(model.known.get(link, TIGHT), TIGHT, BODY_MOST))
             out.append(Term(BodyStrain(), (link,), block=f"body {link}", bound=bound, unit=unit))
 
     def stays(effect: Effect | Tolerance, place: Place, block: str, size: float) -> None:
@@ -91,14 +91,14 @@ def block_terms(
         place, motor = (actuator.name,), actuator.motor
         stays(EFFECTS["position_offset"], place, "zeros", ENCODER_TOLERANCE)
         if any(isinstance(e, Friction) for e in actuator.elements):
-            wide = min(max(model.known.get(actuator.name, 0.0), _STATED_FRICTION), _STATED_MOST)
+            wide = min(max(model.known.get(actuator.name, 0.0), STATED_FRICTION), STATED_MOST)
             stays(factor, place, "friction", wide)
         if motor is not None and "torque" not in m.channels:
             stays(EFFECTS["joint_elasticity"], place, "wind-up", COMPLIANCE_TOLERANCE)
             wide = max(CONSTANT_TOLERANCE, motor.torque_constant_spread)
             stays(EFFECTS["torque_constant_error"], place, f"constant {wide:g}", wide)
             if "voltage" in m.channels or "power" in m.channels:
-                wide = max(_RESISTANCE, motor.resistance_spread)
+                wide = max(RESISTANCE, motor.resistance_spread)
                 stays(Resistance(), place, f"resistance {wide:g}", wide)
     if model.known and (EVERY,) in factor.places(model, m):
         # What a log showed of friction is another with every day's temperature.

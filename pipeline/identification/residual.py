@@ -22,7 +22,7 @@ from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification import results as limits
 from pipeline.identification.fit import Fit, independent
 from pipeline.identification.results import Residual
-from pipeline.identification.settings import COLOURED, LAW, SURE
+from pipeline.identification.settings import COLOURED, FEWEST_ROWS, LAW, SURE, TELLING
 from pipeline.identification.tolerances import Slope
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Finding, Log, column_name
 from pipeline.logs.reduce import INSTEAD
@@ -34,12 +34,8 @@ if TYPE_CHECKING:
 
 #: The way of sorting that leaves a joint whole.
 WHOLE: Final = "joint"
-#: Fewer rows in a band say nothing.
-FEWEST_ROWS: Final = 20
 
 _BINS: Final = 12
-#: Share of the remaining variance that a variable's curve explains, to be worth a word.
-_TELLING: Final = 0.08
 #: What is said of a remainder that depends on nothing.
 NO_VARIABLE: Final = "depends on no single variable of the motion"
 
@@ -278,7 +274,7 @@ def residuals(
                 both = (rest, series), (rest * np.sign(v[:, j]), against)
                 every = ((explained(x, one), name) for x, of in both for name, one in of.items())
                 share, variable = max(every)
-                if share >= _TELLING:
+                if share >= TELLING:
                     text = f"depends on the {variable} ({100 * share:.0f} % of it)"
                 elif error > COLOURED * level:
                     text = NO_VARIABLE

@@ -38,7 +38,7 @@ from pipeline.identification.offered import (
     reversals,
     ripple_terms,
 )
-from pipeline.identification.settings import STEP
+from pipeline.identification.settings import BARE, BENT, FORESEES, NO_RISE, STEP, STRAIGHT
 from pipeline.identification.tolerances import BodyStrain, Slope, inertial, slope
 from pipeline.machine.machine import MachineModel
 
@@ -46,25 +46,14 @@ logger = logging.getLogger("legwatt")
 
 #: Moves that are estimated in earnest at each step, the most promising ones.
 _TRIED: Final = 3
-#: Share of the foremost move's foreseen gain, or of that of the name it would replace, below which
-#: a move is not estimated: both are foreseen on one noise, which estimates change alike.
-_FORESEES: Final = 0.5
 #: Turns of scales and noise in a trial.
 _QUICK: Final = 5
 #: Times the search goes on about its own answer, at most.
 _ROUNDS: Final = 3
 #: Times that a name by itself is followed to where its columns no longer change.
 _NEWTON: Final = 5
-#: Small steps of a coordinate beyond which a prediction that is not linear in it has bent.
-_BENT: Final = 20.0
-#: Rise of the evidence that is none, and below which what stands is not exchanged: "not worth more
-#: than a bare mention" (Kass and Raftery, JASA 90, 1995: 2 ln B = 2).
-_NOTHING: Final = 0.01
-_BARE: Final = 1.0
 #: Shares of the way to linear estimates at which columns may be made anew.
 _SHARES: Final = (1.0, 0.5, 0.25, 0.1, 0.0)
-#: Share of what estimates promise by which a model with them may fall short of it.
-_STRAIGHT: Final = 0.1
 #: Steps of an estimate with bodies that bend, at most, and the damping that leaves no step.
 _DAMPED: Final = 30
 _STIFF: Final = 1e6
@@ -183,7 +172,7 @@ def _far(fit: Fit) -> list[Term]:
             out.append(term)
         if isinstance(term.effect, Effect) and not term.effect.additive:
             steps = np.array([c.step for c in term.effect.coordinates])
-            bent = (np.abs(own) > _BENT * steps).any()
+            bent = (np.abs(own) > BENT * steps).any()
             if bent and (np.abs(own) > fit.spread[d.columns[k]]).any():
                 out.append(term)
     return out
@@ -272,11 +261,11 @@ def impossible(fit: Fit) -> list[int]:
     return out
 
 
-def _best(fit: Fit, of: Sequence[Move], least: float = _NOTHING) -> Fit | None:
+def _best(fit: Fit, of: Sequence[Move], least: float = NO_RISE) -> Fit | None:
     """The best of some moves in earnest, if it is better than staying by some evidence."""
     best = None
     for move in of:
-        if best is not None and move[0] < _FORESEES * of[0][0]:
+        if best is not None and move[0] < FORESEES * of[0][0]:
             break
         other = _taken(fit, move)
         better = other.rise(best) > 0.0 if best else other.rise(fit) > least
@@ -323,17 +312,17 @@ def _swapped(fit: Fit) -> Fit:
             continue
         less = fit.without(k)
         gains = {k in m[1]: m[0] for m in reversed(moves(replace(less, negative=fit.negative)))}
-        if gains.get(False, 0.0) < _FORESEES * gains.get(True, 0.0):
+        if gains.get(False, 0.0) < FORESEES * gains.get(True, 0.0):
             continue
         rest = settled(less, _QUICK)
-        found = _best(fit, [m for m in moves(rest) if k not in m[1]][:2], _BARE)
+        found = _best(fit, [m for m in moves(rest) if k not in m[1]][:2], BARE)
         if found is not None:
             return _swapped(_pruned(found))
     for block in sorted(fit.loose):
         rest = settled(replace(fit, loose=fit.loose - {block}, negative=None), _QUICK)
         if fit.rise(rest) < 0.0:
             return _swapped(rest)
-        found = _best(fit, [m for m in moves(rest) if block not in m[2]][:1], _BARE)
+        found = _best(fit, [m for m in moves(rest) if block not in m[2]][:1], BARE)
         if found is not None:
             return _swapped(_pruned(found))
     return fit
@@ -421,7 +410,7 @@ def _point(fit: Fit) -> list[Placed]:
         loss = _loss_at(fit, placed)
         if best is None or loss < best[0]:
             best = loss, placed
-            if loss <= promised + _STRAIGHT * (start - promised) + _NOTHING:
+            if loss <= promised + STRAIGHT * (start - promised) + NO_RISE:
                 break  # as foreseen
         elif share < 0.5:
             break
@@ -470,7 +459,7 @@ def _curved(fit: Fit) -> tuple[Array, float]:
             if there[2] < before:
                 x, (u, left, loss) = other, there
             damping *= 0.1 if loss < before else 10.0
-        if before - loss < _NOTHING:
+        if before - loss < NO_RISE:
             break
     out[ids] = x
     return out, left

@@ -20,28 +20,24 @@ import numpy as np
 from actuators.arrays import Array, Mask
 from pipeline.effects.model_file import Edit
 from pipeline.identification.results import Found
+from pipeline.identification.settings import (
+    COVER,
+    CROSSING,
+    FRICTION_SHARE,
+    LEAST_ROWS,
+    ONE_SIDE,
+    SEEN,
+    SURE_SIGN,
+)
 from pipeline.logs.log import TEST, Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
 
 #: Why the gap in torque has no say: the torque hardly shows it.
 READ_OFF: Final = "read off two positions"
-#: Standard errors in half of a 95 % interval.
-_COVER: Final = 1.96
 #: Stiffness of what does not bend [N*m/rad].
 _RIGID: Final = 1e12
-#: Torque over which a joint passes from one flank to the other, of the largest seen [1].
-_CROSSING: Final = 0.05
-#: Standard deviations from which a slope or a step counts as seen.
-SEEN: Final = 4.0
-#: Torques below this many standard deviations do not tell their sign.
-_SURE: Final = 3.0
-#: ... nor below this share of its root mean square, which friction may be.
-_FRICTION: Final = 0.25
 _BLOCKS: Final = 24
-_LEAST_ROWS: Final = 60
-#: Share of what a filter sees that must have the torque's sign.
-_ONE_SIDE: Final = 0.98
 
 
 def read_off_two(model: MachineModel, measurements: Sequence[Log], first: int) -> tuple[Found, ...]:
@@ -73,7 +69,7 @@ def _wider(seen: TwoSides, plain: TwoSides) -> TwoSides:
 
     def wider(own: tuple[float, float], other: float) -> tuple[float, float]:
         other = other if np.isfinite(other) else own[0]
-        return own[0], float(np.hypot(own[1], 0.5 * (own[0] - other) / _COVER))
+        return own[0], float(np.hypot(own[1], 0.5 * (own[0] - other) / COVER))
 
     compliance = wider(seen.compliance, plain.compliance[0])
     return replace(seen, compliance=compliance, width=wider(seen.width, plain.width[0]))
@@ -87,9 +83,9 @@ def _found(joint: str, seen: TwoSides, largest: float) -> Found | None:
     parameters = {"stiffness": {"value": value, "unit": "N*m/rad", "interval": tuple(ends)}}
     if seen.plays:
         width, error = (float(x) for x in seen.width)
-        ends = [max(width - _COVER * error, 0.0), width + _COVER * error]
+        ends = [max(width - COVER * error, 0.0), width + COVER * error]
         parameters["width"] = {"value": width, "unit": "rad", "interval": tuple(ends)}
-        parameters["crossing"] = {"value": _CROSSING * largest, "unit": "N*m"}
+        parameters["crossing"] = {"value": CROSSING * largest, "unit": "N*m"}
     name = "backlash" if seen.plays else "joint_elasticity"
     edit = Edit.model_validate({"effect": name, "place": (joint,), "parameters": parameters})
     return Found(order=0, edits=(edit,), law=READ_OFF)
@@ -117,7 +113,7 @@ class TwoSides:
     def stiffness(self) -> tuple[float, float, float]:
         """K of a spring that shows, with the ends of its 95 % interval [N*m/rad]."""
         c, e = self.compliance
-        return 1.0 / c, 1.0 / (c + _COVER * e), 1.0 / max(c - _COVER * e, 1e-300)
+        return 1.0 / c, 1.0 / (c + COVER * e), 1.0 / max(c - COVER * e, 1e-300)
 
 
 def two_sides(log: Log) -> dict[str, TwoSides]:
@@ -129,7 +125,7 @@ def two_sides(log: Log) -> dict[str, TwoSides]:
         effort, noise = log.effort[:, j, 0], float(log.noise[j, 0])
         # While the filter sees the torque change sides, a step is no step yet.
         side = log.smooth(np.sign(effort)[:, None])[:, 0]
-        good = log.mask[:, j] & (np.abs(side) > _ONE_SIDE)
+        good = log.mask[:, j] & (np.abs(side) > ONE_SIDE)
         rest = 3.0 * float(log.rate_noise[0, j])
         seen = read_off(log.windup[:, j], effort, log.v[:, j], good, noise, rest)
         if seen is not None:
@@ -152,13 +148,12 @@ def read_off(
     """
     good = ok & np.isfinite(ahead) & np.isfinite(torque) & (np.abs(velocity) > rest)
     # The torque that was logged has friction in it: the side is that of what passes the play.
-    sure = max(
-        _SURE * noise, _FRICTION * float(np.sqrt(np.sum(torque[good] ** 2) / max(good.sum(), 1)))
-    )
+    friction = FRICTION_SHARE * float(np.sqrt(np.sum(torque[good] ** 2) / max(good.sum(), 1)))
+    sure = max(SURE_SIGN * noise, friction)
     found = None
     for _ in range(3):
         rows = np.flatnonzero(good & (np.abs(torque) > sure))
-        if rows.size < _LEAST_ROWS or np.ptp(torque[rows]) < 10.0 * noise:
+        if rows.size < LEAST_ROWS or np.ptp(torque[rows]) < 10.0 * noise:
             break
         t, side = torque[rows], np.sign(torque[rows])
         both = 0.05 < float((side > 0).mean()) < 0.95
@@ -167,7 +162,7 @@ def read_off(
         found = TwoSides(told[1], told[3] if both else (np.nan, np.nan), told[2])
         # Friction between motor and spring: the spring's torque is that much off the motor's.
         loop = abs(found.loop[0]) / found.compliance[0] / 2.0 if found.elastic else 0.0
-        wider = _SURE * noise + loop
+        wider = SURE_SIGN * noise + loop
         if wider <= sure * 1.01 or wider > 0.5 * float(np.abs(torque[good]).max()):
             break
         sure = wider

@@ -34,6 +34,22 @@ from actuators.arrays import Array, Index, Mask
 from actuators.elements.element import presliding
 from pipeline.dynamics.residual import body_columns
 from pipeline.identification.offered import TRAVELS
+from pipeline.identification.settings import (
+    ALIKE,
+    BODIES,
+    CHANCE,
+    EXACT,
+    FAR,
+    FEWEST_COMPARED,
+    FLOOR,
+    HALVED,
+    LEFT,
+    LOST,
+    NEAR,
+    SHIFTS,
+    TOLD,
+    WELL,
+)
 from pipeline.logs.log import EFFORTS, Finding, Log, Recording, column_name
 from pipeline.logs.read import AS_NAMED
 from pipeline.machine.machine import MachineModel
@@ -43,31 +59,6 @@ from pipeline.simulation.predict import Simulator
 DEG: Final = 180.0 / np.pi
 #: Rows that are compared, of all logs together: a motion of a minute has a few hundred that differ.
 ROWS: Final = 600
-#: Share of an effort, root mean square, that honest machines leave: nothing more is asked, and what
-#: leaves more is looked at.
-FLOOR: Final = 0.1
-#: Share that may be left where a reading is to explain an effort ...
-WELL: Final = 0.5
-#: ... and share of what was left before: 22 in place of 24 % is no reason to accuse a column.
-HALVED: Final = 0.5
-#: Where as much is left in the middle of the joints by any reading, nothing follows the motion ...
-LOST: Final = 0.75
-#: ... nor where as much is, and efforts that are shifted in time are explained as well as in place,
-#: or with springs, too, several joints are not explained.
-LOOSE: Final = 0.2
-SHIFTS, CHANCE = 20, 0.05
-#: Share of the largest gain within which readings count as alike: the simplest is taken.
-ALIKE: Final = 0.8
-#: Share of what friction alone leaves that bodies as given, of any size, have to bring it below.
-TOLD: Final = 0.7
-#: Factor on an effort that bodies may be wrong by: a URDF's masses are guesses at times.
-BODIES: Final = 2.5
-#: ... and from which none of a robot's files is that wrong, unit or not.
-FAR: Final = 5.0
-#: Distance from a unit or a ratio within which an odd factor is taken for it.
-NEAR: Final = 1.4
-#: ... and for factors so small that bodies may be them: only where all joints agree within this.
-EXACT: Final = 0.01
 #: Delays that are tried [s]: shorter ones are the machine's, and the estimate has them.
 DELAYS: Final = (0.04, 0.07, 0.12, 0.2)
 #: Units in which efforts come by mistake, and what they then are.
@@ -121,7 +112,6 @@ _READING: Final = np.dtype(
 #: Columns of friction and the rotor's inertia.
 _LAWS: Final = 5 + len(TRAVELS)
 _STEPS: Final = 8
-_FEWEST: Final = 60
 _TINY: Final = 1e-300
 _ROUNDED: Final = 1e-9
 
@@ -227,7 +217,7 @@ class Gate:
         left = np.flatnonzero(shares > WELL).tolist()
         sprung = [self._share(reading, j, "springs") for j in left]
         several = sum(share > WELL for share in sprung) > 1
-        if middle > LOST or (middle > LOOSE and (several or self._shifted() > CHANCE)):
+        if middle > LOST or (middle > LEFT and (several or self._shifted() > CHANCE)):
             return [Step("lost", (), before=_rms(judged))]
         return [*out, *self._sizes(reading, shares)]
 
@@ -336,7 +326,7 @@ class Gate:
         X = np.column_stack([asked.columns[rows, j], own])
         if more:
             X = np.hstack([X, getattr(asked, more)[rows, j]])
-        if rows.size < max(_FEWEST, X.shape[1] // 2):
+        if rows.size < max(FEWEST_COMPARED, X.shape[1] // 2):
             return np.nan
         t = self.torque(reading, j)[rows] + own
         t = np.roll(t, round(shifted * t.size))

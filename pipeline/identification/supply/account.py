@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
 from pipeline.columns import frame
+from pipeline.identification.settings import FEWEST_SAMPLES, SMALL
 from pipeline.identification.supply.drives import DrivePower, drive_power, supply_samples
 from pipeline.identification.supply.fit import OWN, Fit
 from pipeline.logs.log import Log
@@ -25,10 +26,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 UNEXPLAINED, MEASURED = "unexplained", "measured"
-#: Fewest samples from which terms can be separated and tested.
-FEWEST: Final = 24
-#: Part of the measured power below which what stays unexplained is no finding.
-SMALL: Final = 0.02
 #: Blocks a log is cut into; every so many one is for the test.
 BLOCKS, TEST_EVERY = 24, 4
 DRAWS, SEED = 300, 1
@@ -85,11 +82,11 @@ def account(given: Machine, logs: Sequence[Log], holdout: int, test_last: float 
             for k, (d, s) in enumerate(zip(drives, samples, strict=True))
         ]
         rows = pandas.concat(parts, ignore_index=True)
-        if len(rows) < FEWEST:
+        if len(rows) < FEWEST_SAMPLES:
             raise LegwattError(
                 f"{', '.join(names)}: {len(rows)} samples of the supply during which all joints "
-                f"are known; at least {FEWEST} are needed to separate terms and to test them; "
-                "log longer"
+                f"are known; at least {FEWEST_SAMPLES} are needed to separate terms and to test "
+                "them; log longer"
             )
         fit = Fit(rows, *_blocks(rows["log"].to_numpy(), holdout, test_last))
         fit = replace(fit, terms=fit.chosen())

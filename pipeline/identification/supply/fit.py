@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
+from pipeline.identification.settings import FOLLOWS, LITTLE, METER
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -41,13 +42,6 @@ TERMS: Final = {
 }
 #: Beside them for the joints of every leg: of many that rub a little, or one that does.
 RUBBING: Final = ("dry friction at each joint that no torque shows", "N*m", 0.0, np.inf)
-#: Share of the root mean square error by which a term has to improve a prediction: where a motion
-#: repeats, so do the model's own errors, and what is no better in truth is a little better in every
-#: block. Nothing is improved below a share of the power that no meter at a supply tells from zero.
-LITTLE: Final = 0.05
-METER: Final = 1e-3
-#: Share of the power's variance that a sum may leave which the power is said to follow.
-FOLLOWS: Final = 0.5
 #: Fits that leave blocks out.
 FOLDS: Final = 6
 
