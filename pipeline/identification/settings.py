@@ -102,9 +102,10 @@ ONE_SIDE: Final = 0.98
 # Of columns that are not what they say (`wrong_columns.py`).
 
 #: Share of an effort, root mean square, that honest machines leave: nothing more is asked, and what
-#: leaves more is looked at.
+#: leaves more is looked at. Of a leg in the air it is a share of all that its joint gives.
 FLOOR: Final = 0.1
-#: Share that may be left where a reading is to explain an effort ...
+#: Share that may be left where a reading is to explain an effort, and that has to be left for any
+#: look where only the lowest feet tell which stand ...
 WELL: Final = 0.5
 #: ... and share of what was left before: 22 in place of 24 % is no reason to accuse a column.
 HALVED: Final = 0.5

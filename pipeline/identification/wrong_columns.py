@@ -52,6 +52,7 @@ from pipeline.identification.settings import (
 )
 from pipeline.logs.log import EFFORTS, Finding, Log, Recording, column_name
 from pipeline.logs.read import AS_NAMED
+from pipeline.logs.reduce import find_contact
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.equations import Moved, is_on_legs, motion_of
 from pipeline.simulation.predict import Simulator
@@ -178,6 +179,7 @@ class Gate:
         ratio: Array | None = None,
         *,
         by_law: bool = False,
+        guessed: bool = False,
     ) -> None:
         """Begin.
 
@@ -186,14 +188,21 @@ class Gate:
             logs: All logs of it.
             ratio: Of gears, shape (J,), NaN where it is not known.
             by_law: Whether the torque was computed from targets and servo gains.
+            guessed: Whether a leg that is taken to be in the air may touch the ground.
         """
         self.model, self.logs, self.by_law = model, logs, by_law
+        self.floor = WELL if guessed else FLOOR
         unknown = np.full(len(model.joints), np.nan)
         self.ratio = unknown if ratio is None else np.abs(ratio)
         self.named = as_named(len(model.joints))
         every = max(1, sum(len(m) for m in logs) // ROWS)
         self.parts = [(m, motion_of(model, m), np.arange(0, len(m), every)) for m in logs]
         self.mask = np.concatenate([_counted(model, m, moved)[at] for m, moved, at in self.parts])
+        # A leg in the air takes little: what is left is held against all that its joint gives.
+        counts = np.concatenate([m.mask for m in logs])
+        given = np.where(counts, np.concatenate([m.effort[..., 0] for m in logs]), 0.0)
+        size = np.sqrt((given**2).sum(axis=0) / np.maximum(counts.sum(axis=0), 1))
+        self.given = size * model.robot.floating
         self._asked: dict[bytes, Asked] = {}
         self._senses: dict[int, Array] = {}
         self._left: dict[tuple[bytes, bytes, int, str], float] = {}
@@ -202,7 +211,7 @@ class Gate:
         """What is wrong with the columns, each with its evidence; nothing where nothing is."""
         reading, out = self.named, list[Step]()
         shares = self.shares(reading)
-        while len(out) < _STEPS and (np.nan_to_num(shares) > FLOOR).any():
+        while len(out) < _STEPS and (np.nan_to_num(shares) > self.floor).any():
             step = self._best(reading, shares)
             if step is None:
                 break
@@ -332,7 +341,8 @@ class Gate:
         t = np.roll(t, round(shifted * t.size))
         size = np.sqrt((X**2).sum(axis=0))
         seen = size > 1e-9 * size.max()
-        whole = float(np.linalg.norm(t)) + _TINY
+        given = np.sqrt(rows.size) * self.given[i] * abs(reading["factor"][j] / asked.slope[0, j])
+        whole = max(float(np.linalg.norm(t)), float(given)) + _TINY
         both = np.column_stack([X[:, seen] / size[seen], t / whole])
         # The root of the normal equations says as much as all rows do.
         R = np.linalg.cholesky(both.T @ both + 1e-10 * np.eye(both.shape[1])).T
@@ -347,17 +357,17 @@ class Gate:
     def _best(self, start: Reading, before: Array) -> Step | None:
         """The simplest reading that explains about as much as the best, its size refined."""
         best: dict[str, Step] = {}
-        count = int((np.nan_to_num(before) > FLOOR).sum())
+        count = int((np.nan_to_num(before) > self.floor).sum())
         for cause, joints, size in self._tries(before):
             position = cause.startswith("position")
-            done = (s.after < FLOOR and len(s.joints) == count for s in best.values())
+            done = (s.after < self.floor and len(s.joints) == count for s in best.values())
             if position and cause not in best and any(done):
                 break  # what efforts alone explain is no matter of positions
             step = self._tried(start, before, cause, joints, size)
             if step is not None:
                 best[cause] = max(step, best.get(cause, step), key=lambda s: (s.gain, -s.after))
         steps = {cause: self._refined(start, before, step) for cause, step in best.items()}
-        odd = np.flatnonzero(np.nan_to_num(before) > FLOOR)
+        odd = np.flatnonzero(np.nan_to_num(before) > self.floor)
         pushed, sprung = (
             _rms(np.array([self._share(start, j, more) for j in odd.tolist()]))
             for more in ("pushes", "springs")
@@ -372,7 +382,7 @@ class Gate:
 
     def _tries(self, shares: Array) -> Iterator[tuple[str, tuple[int, ...], float]]:
         live = np.flatnonzero(np.isfinite(shares)).tolist()
-        odd = [j for j in live if shares[j] > FLOOR]
+        odd = [j for j in live if shares[j] > self.floor]
         every = [tuple(live)] if len(live) > 1 else []
         for group in [*((j,) for j in odd), *every]:
             yield "sign", group, 1.0
@@ -402,13 +412,13 @@ class Gate:
         wide = cause.startswith(("position", "both"))
         touched = np.flatnonzero(np.isfinite(before)) if wide else np.array(joints)
         after[touched] = [self._share(reading, j) for j in touched.tolist()]
-        told = touched[before[touched] > FLOOR] if wide else touched
+        told = touched[before[touched] > self.floor] if wide else touched
         if not told.size or not np.isfinite(after[list(joints)]).all():
             return None
         b, a = _rms(before[told]), _rms(after[told])
         if a >= min(WELL, HALVED * b):
             return None
-        falls = np.log(np.maximum(before, FLOOR) / np.maximum(after, FLOOR))
+        falls = np.log(np.maximum(before, self.floor) / np.maximum(after, self.floor))
         what = ""
         if cause == "position_scale":
             known = {ratio: "it is that of the motor" for ratio in self._ratios(joints)}
@@ -549,7 +559,9 @@ def wrong_columns(model: MachineModel, logs: Sequence[Log], recording: Recording
         logs: All logs of it.
         recording: The first of them as read, for the names in its file and ratios of gears.
     """
-    gate = Gate(model, logs, recording.ratio, by_law=recording.effort in recording.derived)
+    by_law = recording.effort in recording.derived
+    guessed = model.robot.floating and find_contact(recording) is None
+    gate = Gate(model, logs, recording.ratio, by_law=by_law, guessed=guessed)
     steps, last = gate.steps(), gate.named
     for step in steps:
         last = changed(last, step)

@@ -19,7 +19,9 @@ from pipeline.identification.workflow.compared import compare_logs, load_logs
 from pipeline.logs.log import Finding
 from tests.command_line import as_compared
 from tests.pipeline.arm import BODIES, arm_file, arm_text, sines, table, torques
+from tests.pipeline.dynamics.walking_engine import walked
 from tests.pipeline.identification import bench_leg as leg
+from tests.pipeline.identification.legs import frame_of, robot_of
 
 RATE = 200.0
 Spoil = Callable[[pd.DataFrame], None]
@@ -274,6 +276,13 @@ def test_a_walk_without_foot_forces_is_judged_by_its_legs_in_the_air(tmp_path, t
     found = judged(log, Path("urdf/hexapod.toml"), tmp_path)
     assert [f.column.split("__")[0] for f in found if "sign" in f.detail] == turned
     assert len(found) == len(turned)
+
+
+@pytest.mark.parametrize(("kind", "tilt"), [("flags", 0.0), ("neither", 0.06)])
+def test_a_sound_walk_of_another_engine_is_not_blamed(tmp_path, kind, tilt):
+    robot = robot_of("hexapod")
+    walk = walked(robot, periods=(3.0, 2.6), tilt=tilt, kp=1500.0, noise=0.15)
+    assert judged(frame_of(robot, walk, kind), Path("urdf/hexapod.toml"), tmp_path) == []
 
 
 def test_a_band_too_wide_for_its_accelerations_is_told(urdf, tmp_path):
