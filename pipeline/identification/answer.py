@@ -176,7 +176,7 @@ def answered(found: Fit, allowed: frozenset[Key] | None = None) -> Answer:
 def _without_slopes(fit: Fit) -> bool:
     """Whether a nonlinear parameter of a name has no column by which it is known."""
     terms = fit.design.terms
-    known = {(t.effect.effect, t.place) for t in terms if isinstance(t.effect, Slope)}
+    known = {t.moves for t in terms}
     return any(terms[k].free and terms[k].key not in known for k in fit.names)
 
 
@@ -224,13 +224,13 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
             less = settled(without(fit, k, alone=True), _ANEW)
             sure, share = fit.sure(less, d.touched(k))
             rise = fit.rise(less)
-            if couples(term):  # the joints' own laws act on the shared shaft: all that it moves
+            if couples(term) or d.within(k):  # laws that it has in it, or acts on, stand without it
+                one = replace(one, against_nothing=rise, sure=sure, share=share)
+            if couples(term):
                 one = replace(one, certain=_can_be(fit, k))
             else:
                 apart = sure > SURE and share > SHARE
                 one = replace(one, against_nothing=min(rise, one.against_nothing), apart=apart)
-            if couples(term) or d.within(k):  # what it has in it stands without it
-                one = replace(one, against_nothing=rise, sure=sure, share=share)
         yield one
     # Where one is loose, all are told: the file lacks nothing that the estimate has.
     bodies = [k for k, t in enumerate(d.terms) if isinstance(t.effect, BodyStrain)]
@@ -336,7 +336,7 @@ def _physical(fit: Fit, number: int, deviation: Array) -> dict[str, float]:
     shape = dict(term.shape)
     for k, t in enumerate(d.terms):
         slope = t.effect
-        if isinstance(slope, Slope) and (slope.effect, t.place) == term.key:
+        if isinstance(slope, Slope) and t.moves == term.key:
             shape[slope.parameter] += float(x[d.columns[k]][0])
     pairs = zip(term.effect.coordinates, x[d.columns[number]].tolist(), strict=True)
     return term.effect.physical({c.name: v if c.signed else max(v, 0.0) for c, v in pairs}, shape)

@@ -70,6 +70,11 @@ class Term:
         return self.effect.name, self.place
 
     @property
+    def moves(self) -> Key | None:
+        """Name with whose nonlinear parameter it moves, of a slope; else None."""
+        return (self.effect.effect, self.place) if isinstance(self.effect, Slope) else None
+
+    @property
     def identity(self) -> tuple[object, ...]:
         """What makes it this one."""
         return (*self.key, self.block, *self.shape.items())
@@ -338,10 +343,7 @@ class Design:
     def whole(self, number: int) -> Index:
         """Columns of a name, and of what moves with its nonlinear parameters."""
         key, every = self.terms[number].key, zip(self.terms, self.columns, strict=True)
-        moved = [
-            c for t, c in every if isinstance(t.effect, Slope) and (t.effect.effect, t.place) == key
-        ]
-        return np.concatenate([self.columns[number], *moved])
+        return np.concatenate([self.columns[number], *(c for t, c in every if t.moves == key)])
 
     def within(self, number: int) -> list[int]:
         """Terms at its place with fewer numbers that a term has in it, to `SHARE` of them.
@@ -356,10 +358,9 @@ class Design:
                 ids = np.concatenate([wide, own])
                 H = np.zeros((ids.size, ids.size))
                 for e in self.equations:
-                    at = np.searchsorted(e.ids, ids) % e.ids.size
-                    seen = e.ids[at] == ids
-                    G = e.total[0][np.ix_(at, at)] / max(e.effort, 1e-300) ** 2
-                    H += np.where(seen[:, None] & seen, G, 0.0)
+                    _, at, here = np.intersect1d(e.ids, ids, return_indices=True)
+                    G = e.total[0][np.ix_(at, at)]
+                    H[np.ix_(here, here)] += G / max(e.effort, 1e-300) ** 2
                 w = wide.size
                 told = np.linalg.lstsq(H[:w, :w], H[:w, w:], rcond=_SAME)[0]
                 mine = np.diag(H)[w:]
@@ -377,11 +378,11 @@ class Design:
             own = set(names)
             keys = {self.terms[k].key for k in names}
             gone = keys | {self.terms[b].key for k in names for b in self.within(k)}
-            kept = []
-            for k, t in enumerate(self.terms):
-                lone = isinstance(t.effect, Slope) and (t.effect.effect, t.place) not in keys
-                if k in own or (t.block and t.key not in gone and not lone):
-                    kept.append(k)
+            kept = [
+                k
+                for k, t in enumerate(self.terms)
+                if k in own or (t.block and t.key not in gone and t.moves in (None, *keys))
+            ]
             self._standing[names] = np.concatenate([self.columns[k] for k in kept])
         return self._standing[names]
 

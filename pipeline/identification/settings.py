@@ -49,9 +49,10 @@ TWIN: Final = 3.0
 #: Share of the foremost move's foreseen gain, or of that of the name it would replace, below which
 #: a move is not estimated: both are foreseen on one noise, which estimates change alike.
 FORESEES: Final = 0.5
-#: Rise of the evidence that is none, and below which what stands is not exchanged: "not worth more
-#: than a bare mention" (Kass and Raftery, JASA 90, 1995: 2 ln B = 2).
+#: Rise of the evidence that is none.
 NO_RISE: Final = 0.01
+#: ... and below which what stands is not exchanged: "not worth more than a bare mention" (Kass and
+#: Raftery, JASA 90, 1995: 2 ln B = 2).
 BARE: Final = 1.0
 #: Share of what estimates promise by which a model with them may fall short of it.
 STRAIGHT: Final = 0.1
