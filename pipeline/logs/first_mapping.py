@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,8 +19,8 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
-from actuators.parameters import dimension
-from pipeline.logs.formats import TIMES, Source, open_source, unit_spelt
+from actuators.parameters import dimension, spelt
+from pipeline.logs.formats import TIMES, open_source
 from pipeline.logs.log import TIME, UNITS, Expected, column_name
 
 #: Words of a name and the quantity that they say.
@@ -53,6 +53,12 @@ _OF_UNIT: Final = {
     **{"angle": "position", "angular velocity": "velocity"},
     **{name: name for name in ("torque", "current", "voltage")},
 }
+#: Units as people write them beside `actuators.parameters`, which knows ``Nm`` and ``°/s``.
+_SPELT: Final = {
+    **{"nm": "N*m", "mnm": "mN*m", "ncm": "N*cm", "c": "degC", "celsius": "degC"},
+    **{"radians": "rad", "rad/sec": "rad/s", "degrees": "deg", "deg/sec": "deg/s", "dps": "deg/s"},
+    **{"sec": "s", "seconds": "s", "milliseconds": "ms", "amps": "A", "volts": "V", "-": "1"},
+}
 _SECONDS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _ANGLES: Final = {"rad": 1.0, "deg": float(np.radians(1.0))}
 _POSITIONS: Final = ("position", "motor_position")
@@ -73,7 +79,7 @@ _HEAD: Final = """\
 _NO_CLOCK: Final = """
 # No column runs on like a clock: put the rate at which it was logged.
 # [time]
-# sample_rate = {value = 1000, unit = "Hz"}"""
+# sample_rate = 1000  # [Hz]"""
 
 
 @dataclass
@@ -118,12 +124,14 @@ def first_mapping(path: Path, expected: Expected) -> FirstMapping:
     Raises:
         LegwattError: The file is no table of numbers.
     """
-    table, data = _numbers(path)
-    own = {c: expected.columns[c].quantity for c in table.header if c in expected.columns}
-    clock, text = _clock(table, data, own)
+    table = open_source(path)
+    every = table.columns(table.header, texts=True)
+    data = {name: x[:_ROWS] for name, x in every.items() if np.isfinite(x).any()}
+    own = {c for c in table.header if c in expected.columns}
+    clock, text = _clock(data, own)
     foreign = [c for c in data if c not in {*own, clock} and "*" not in c]
     for by_unit in (False, True):  # words of another language: units tell
-        guesses = [read_name(c, table.units.get(c, ""), expected.joints, by_unit) for c in foreign]
+        guesses = [read_name(c, expected.joints, by_unit) for c in foreign]
         if any(g.quantity in _POSITIONS for g in guesses):
             break
     guesses = [g for g in guesses if g.quantity]
@@ -151,52 +159,25 @@ def _quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False)
 
 
-def _numbers(path: Path) -> tuple[Source, dict[str, Array]]:
-    """The file, and its columns with numbers, NaN where one is not finite; those of text left out.
-
-    Raises:
-        LegwattError: Fewer than two columns hold numbers.
-    """
-    table, data, reason = open_source(path), dict[str, Array](), ""
-    try:
-        data = table.columns(table.header)
-    except LegwattError as error:
-        reason = str(error)
-        for name in table.header:
-            with suppress(LegwattError):
-                data |= table.columns([name])
-    finite = {name: np.where(np.isfinite(x), x, np.nan)[:_ROWS] for name, x in data.items()}
-    data = {name: x for name, x in finite.items() if np.isfinite(x).any()}
-    if len(data) < 2:
-        raise LegwattError(reason or f"{table.where}: fewer than two columns of numbers")
-    return table, data
-
-
-def _clock(
-    table: Source, data: Mapping[str, Array], own: Mapping[str, str]
-) -> tuple[str, list[str]]:
+def _clock(data: Mapping[str, Array], own: Collection[str]) -> tuple[str, list[str]]:
     """The column of time, and the lines that say so."""
-    named = [c for c in data if c not in own and {*words_of(c), c} & {*TIMES}]
-    # What is called time is taken at last although it runs back: reading says where.
-    turns = [*named, *(c for c in data if c not in {*own, *named}), *named[:1]]
-    turns = [TIME] if TIME in own and TIME in data else turns
-    for k, column in enumerate(turns):
+    if TIME in own:
+        return TIME, []
+    # One that is called time, else one that never runs back.
+    named = [c for c in data if {*words_of(c), c} & {*TIMES}]
+    for column in (*named, *data):
         step = np.diff(data[column])
-        step = step[np.isfinite(step)]
-        back = (step < 0).any() and not (column == TIME or (named and k + 1 == len(turns)))
-        if step.size < 2 or not (step > 0).any() or back:
+        if step.size < 2 or not (step > 0).any() or (column not in named and not (step >= 0).all()):
             continue
-        stated = read_name(column, table.units.get(column, "")).unit
-        stated = stated or unit_spelt(column.rpartition("_")[2])
+        stated = read_name(column).unit or unit_spelt(column.rpartition("_")[2])
         typical = float(np.median(step[step > 0]))
         rates = {unit: 1.0 / (typical * seconds) for unit, seconds in _SECONDS.items()}
         units = [u for u, rate in rates.items() if _RATES[0] <= rate <= _RATES[1]]
         units = [stated] if stated in _SECONDS else units
         if units:
-            lines = ["", "[time]"] + [f"column = {_quoted(column)}"] * (column != TIME)
             other = "".join(f"; or {unit}" for unit in units[1:])
-            lines += [f'unit = "{units[0]}"  # {rates[units[0]]:.4g} Hz{other}']
-            return column, lines * ((column, units[0]) != (TIME, "s"))
+            lines = ["", "[time]", f"column = {_quoted(column)}"]
+            return column, [*lines, f'unit = "{units[0]}"  # {rates[units[0]]:.4g} Hz{other}']
     return "", _NO_CLOCK.splitlines()
 
 
@@ -247,29 +228,35 @@ def words_of(name: str) -> list[str]:
     return [part.lower() for part in parts]
 
 
-def read_name(
-    column: str, unit: str = "", joints: Sequence[str] = (), by_unit: bool = False
-) -> Guess:
+def unit_spelt(text: str) -> str:
+    """The unit that a text means, as `actuators.parameters` writes it; empty where it is none."""
+    plain = text.strip()
+    for name in (plain, _SPELT.get(plain.lower(), ""), plain.replace("_", "/")):
+        with suppress(LegwattError):
+            return spelt(name)
+    return ""
+
+
+def read_name(column: str, joints: Sequence[str] = (), by_unit: bool = False) -> Guess:
     """Read a name: what one of `joints` is called in full in it is no word, `q` of `q_elbow/pos`.
 
-    `unit` is that of a row of units, empty where there is none. It alone tells the quantity where
-    no word does, of a joint called in full; of any column if asked.
+    A unit at its end alone tells the quantity where no word does, of a joint called in full; of any
+    column if asked.
     """
     for joint in sorted((j for j in joints if len(j) > 2), key=len, reverse=True):
         rest = re.sub(rf"(?i)(?<![a-z0-9]){re.escape(joint)}(?![a-z0-9])", "", column)
-        if rest != column and (inside := read_name(rest, unit, by_unit=True)).quantity:
+        if rest != column and (inside := read_name(rest, by_unit=True)).quantity:
             return replace(inside, column=column, owner=joint)
     bracket = re.search(r"[\[(]([^\[\]()]*[^\d\[\]()][^\[\]()]*)[\])]\s*$", column)
-    spelt = unit_spelt(bracket[1]) if bracket else ""
-    if bracket and spelt:
-        return _read(column, column[: bracket.start()], unit or spelt, by_unit)
+    if bracket and (unit := unit_spelt(bracket[1])):
+        return _read(column, column[: bracket.start()], unit, by_unit)
     parts = column.split("_")
     for k in (2, 1):  # the name's end: _rad_s before _s; `tau_a` is of a joint `a`, since A is none
-        own = unit_spelt("/".join(parts[-k:])) if not unit and len(parts) > k else ""
-        inside = _read(column, "_".join(parts[:-k]), own, by_unit)
-        if own and inside.quantity:
+        unit = unit_spelt("/".join(parts[-k:])) if len(parts) > k else ""
+        inside = _read(column, "_".join(parts[:-k]), unit, by_unit)
+        if unit and inside.quantity:
             return inside
-    return _read(column, column, unit, by_unit)
+    return _read(column, column, "", by_unit)
 
 
 def _read(column: str, text: str, unit: str, by_unit: bool) -> Guess:
@@ -278,17 +265,17 @@ def _read(column: str, text: str, unit: str, by_unit: bool) -> Guess:
     goal = next((w for w in words if w in _SAYS["goal"] and (w != "d" or "q" in words)), "")
     found = next((w for w in words if w in _KEYWORD), "")
     told = _OF_UNIT.get(dimension(unit), "") if by_unit and unit else ""
-    quantity, motor = _KEYWORD.get(found, told), bool(_SAYS["motor"] & {*words})
+    quantity = _KEYWORD.get(found, told)
     owner = "_".join(w for w in words if w not in {found, goal} | _SAYS["empty"])
     if _SAYS["no measurement"] & {*words}:
         quantity = ""
     elif goal:
         quantity = "goal_position" if quantity in ("", "position") else ""
-    elif _SAYS["supply"] & {*words} and (quantity in _OF_SUPPLY or not quantity):
+    elif _SAYS["supply"] & {*words}:
         volts = {"vbat", "vbus"} & {*words} or (unit and dimension(unit) == "voltage")
         quantity = _OF_SUPPLY.get(quantity, "supply" if volts else "")
         owner = SUPPLY
-    elif motor and quantity == "position":
+    elif _SAYS["motor"] & {*words} and quantity == "position":
         quantity = "motor_position"
     if quantity and unit and dimension(UNITS[quantity]) != dimension(unit):
         quantity = ""

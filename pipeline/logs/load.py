@@ -154,8 +154,6 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
     Raises:
         LegwattError: Unusable input; one line.
     """
-    if asked.mapping is not None:
-        asked.mapping.refuse_unknown_logs(paths)
     useless, found = dict[int, str](), list[Finding]()
     good = dict[int, Recording]()
     for k, path in enumerate(paths):
@@ -378,10 +376,8 @@ def _tested(
 ) -> tuple[set[int], str]:
     """Numbers of the logs for the test, and that rule in words.
 
-    Those after the first `fitted`, which are held out; else one condition, else every fourth log or
-    the last one. Of the condition that takes most values, the median one is left out: to predict
-    between what was seen is fair, at the ends it is extrapolation. A share of every log, at its
-    end, is for the test instead, or blocks of the only one.
+    Those after the first `fitted`, which are held out; else a share of every log, at its end,
+    blocks of the only one, every fourth log, or the last one.
     """
     if prove_last is not None and not 0.05 <= prove_last <= 0.8:
         raise LegwattError(f"share to test on is {prove_last:g}; expected 0.05 to 0.8")
@@ -391,15 +387,6 @@ def _tested(
         return set(), f"tested on the last {100 * prove_last:g} % of every log"
     if len(logs) == 1:
         return set(), _BLOCKS
-    conditions = [dict(log.condition) for log in logs]
-    shared = sorted(set.intersection(*map(set, conditions)))
-    values = {key: {c[key] for c in conditions} for key in shared}
-    key = max(values, key=lambda k: len(values[k]), default="")
-    if key and len(values[key]) > 1:
-        ordered = sorted(values[key], key=lambda v: (isinstance(v, str), v))
-        middle = ordered[len(ordered) // 2]
-        chosen = {k for k, c in enumerate(conditions) if c[key] == middle}
-        return chosen, f"tested on the logs with {key} = {middle}"
     if len(logs) >= _MANY_LOGS:
         return set(range(3, len(logs), len(PATTERN))), "tested on every fourth log"
     return {len(logs) - 1}, f"tested on the log {logs[-1].name}"

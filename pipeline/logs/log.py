@@ -185,8 +185,6 @@ class Recording:
     #: ``"open"`` (no current flows) or ``"shorted"`` where the drive is off.
     torque_off_bridge: str | None = None
     left_out: Mapping[str, str] = field(default_factory=dict)  #: Joint to why.
-    #: What distinguishes this log from others, e.g. ``{"payload": 0.5}``.
-    condition: Mapping[str, float | str] = field(default_factory=dict)
     #: Channels that were computed from others by the mapping, with the formula.
     derived: Mapping[str, str] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()  #: What reading saw.

@@ -7,23 +7,23 @@ All tables are optional; the README of `pipeline/logs` shows every key.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Sequence
 from collections.abc import Mapping as MappingType
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, Strict, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from actuators.arrays import Array
 from actuators.checked import Number, Table, Text, checked, read_toml
 from actuators.errors import known, one_line
 from actuators.parameters import dimension, from_si, to_si
-from pipeline.logs.log import COLUMNS, EFFORTS, TIME
+from pipeline.logs.log import TIME
 
 #: Beyond these a number is a slip, and some product of it overflows.
 LARGEST: Final = 1e12
+#: Of servos, in words.
+LAW: Final = "kp (goal - position) + kd (goal velocity - velocity) + goal torque"
 #: What a reader of results must know of a torque that the servos' law gives.
 CANNOT: Final = (
     "is computed by the servos' law from targets and gains, not measured: the delay and bandwidth "
@@ -32,19 +32,16 @@ CANNOT: Final = (
 )
 
 
-def _refused(wrong: Callable[[Any], bool], why: str) -> AfterValidator:
-    def check(value: Any) -> Any:
-        if wrong(value):
-            raise ValueError(why)
-        return value
-
-    return AfterValidator(check)
+def _not_zero(value: float) -> float:
+    if value == 0.0:
+        raise ValueError("must not be zero")
+    return value
 
 
 Small = Annotated[Number, Field(ge=-LARGEST, le=LARGEST)]
-Factor = Annotated[Small, _refused(lambda value: value == 0.0, "must not be zero")]
+Factor = Annotated[Small, AfterValidator(_not_zero)]
 Gain = Annotated[Number, Field(ge=0.0, le=1e6)]
-Pattern = Annotated[Text, _refused(lambda x: x.count("*") > 1, "at most one star in a pattern")]
+Pattern = Annotated[Text, Field(pattern=r"^[^*]*\*?[^*]*$")]  # at most one star
 
 
 def _unit_of(expected: str | None) -> AfterValidator:
@@ -70,19 +67,12 @@ class QuantityTable(Table):
         return to_si(self.value, self.unit)
 
 
-class RateTable(QuantityTable):
-    """A rate above zero."""
-
-    value: Annotated[Number, Field(gt=0.0, le=1e9)]
-    unit: Annotated[str, _unit_of("frequency")]
-
-
 class TimeTable(Table):
     """Where time comes from."""
 
     column: str | None = None
     unit: Annotated[str, _unit_of("time")] = "s"
-    sample_rate: RateTable | None = None
+    sample_rate: Annotated[Number, Field(gt=0.0, le=1e9)] | None = None  #: [Hz]
 
     @model_validator(mode="after")
     def _one(self) -> Self:
@@ -169,54 +159,11 @@ class PdGains(Table):
             torque = torque + kd * (np.nan_to_num(logged.get("goal_velocity", zero)) - speed)
         return np.clip(torque, -limit, limit)
 
-    def words(self, quantities: Collection[str]) -> str:
-        """The law in words, for what a log has."""
-        goal = "goal velocity" if "goal_velocity" in quantities else "0"
-        own = "velocity" if "velocity" in quantities else "derivative of position"
-        more = " + goal torque" * ("goal_torque" in quantities)
-        limit = ", clipped at the limit" * (self.limit != np.inf)
-        return f"kp (goal - position) + kd ({goal} - {own}){more}{limit}"
-
-
-def _stand_for_columns(constants: dict[str, QuantityTable]) -> dict[str, QuantityTable]:
-    """Constants stand for columns, of their dimension."""
-    units = {column.suffix: column.unit for column in COLUMNS}
-    for name, quantity in constants.items():
-        expected = dimension(units.get(name.rpartition("__")[2], quantity.unit))
-        if (found := dimension(quantity.unit)) != expected:
-            raise ValueError(
-                f"'{one_line(name)}.unit': '{quantity.unit}' is a unit of {found}, "
-                f"expected {expected}"
-            )
-    return constants
-
-
-Constants = Annotated[dict[str, QuantityTable], AfterValidator(_stand_for_columns)]
-
-
-class LogTable(Table):
-    """What holds for some of the logs only."""
-
-    match: Text
-    gain_per_rad: Small | None = None
-    condition: dict[str, str | Small] = Field(default_factory=dict)
-    constants: Constants = Field(default_factory=dict)
-
-    def names(self, path: Path) -> bool:
-        """Whether a log's file, with or without its ending, is one of those it holds for."""
-        return any(fnmatchcase(name, self.match) for name in (path.stem, path.name))
-
-
-def _listed(value: object) -> object:
-    if not isinstance(value, list | tuple):
-        raise ValueError("must be written [[logs]] with two brackets")
-    return value
-
 
 class Mapping(Table):
     """The whole file."""
 
-    effort: Annotated[str, AfterValidator(lambda name: known("=", name, EFFORTS))] | None = None
+    effort: Literal["torque", "current", "voltage", "power"] | None = None
     time: TimeTable = TimeTable()
     columns: dict[Pattern, ColumnTable] = Field(default_factory=dict)
     joints: dict[str, str] = Field(default_factory=dict)
@@ -224,16 +171,8 @@ class Mapping(Table):
     gear_ratio: dict[str, Factor] = Field(default_factory=dict)
     controller: ControllerTable = ControllerTable()
     pd_gains: PdGains | None = None
-    constants: Constants = Field(default_factory=dict)
-    logs: Annotated[tuple[LogTable, ...], Strict(False), BeforeValidator(_listed)] = ()
+    constants: dict[str, QuantityTable] = Field(default_factory=dict)
     where: str = Field(default="mapping", exclude=True)  #: The file's name, for messages.
-
-    @model_validator(mode="after")
-    def _stars(self) -> Self:
-        for name, column in self.columns.items():
-            if column.target is not None and "*" in column.target and "*" not in name:
-                raise ValueError(f"columns.{name}: as = '{column.target}' has a star, it has none")
-        return self
 
     @property
     def rules(self) -> dict[str, ColumnTable]:
@@ -242,31 +181,6 @@ class Mapping(Table):
         stars = {text: rule for text, rule in self.columns.items() if "*" in text}
         named = {text: rule for text, rule in self.columns.items() if text not in stars}
         return {self.time.column or TIME: time} | {TIME: time} | named | stars
-
-    def rule_for(self, path: Path) -> LogTable:
-        """What holds for one log: its file's name is matched against every `[[logs]]`."""
-        gain, constants = self.controller.gain_per_rad, dict(self.constants)
-        condition: dict[str, float | str] = {}
-        for rule in self.logs:
-            if rule.names(path):
-                gain = rule.gain_per_rad if rule.gain_per_rad is not None else gain
-                condition |= rule.condition
-                constants |= rule.constants
-        return LogTable(match="*", gain_per_rad=gain, condition=condition, constants=constants)
-
-    def refuse_unknown_logs(self, paths: Sequence[Path]) -> None:
-        """Refuse a `[[logs]]` that names no log, where one of the logs is named by none.
-
-        Files beside the logs count as known, too.
-
-        Raises:
-            LegwattError: Names the entry, and the closest log.
-        """
-        unnamed = sorted(p.stem for p in paths if not any(rule.names(p) for rule in self.logs))
-        beside = [p for folder in {p.parent for p in paths} for p in folder.iterdir()]
-        for rule in self.logs:
-            if unnamed and not any(map(rule.names, [*paths, *beside])):
-                known("no log is called", rule.match, unnamed, f"{self.where}: logs")
 
 
 def load_mapping(path: Path) -> Mapping:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, replace
-from difflib import SequenceMatcher, get_close_matches
+from difflib import SequenceMatcher
 from pathlib import Path
 from typing import Any, Final, TypeGuard
 
@@ -31,7 +31,7 @@ from pipeline.logs.log import (
     Recording,
     column_name,
 )
-from pipeline.logs.mapping import CANNOT, ColumnTable, LogTable, Mapping
+from pipeline.logs.mapping import CANNOT, LAW, ColumnTable, Mapping
 
 POSITIONS: Final = ("position", "motor_position")
 AS_NAMED: Final = ColumnTable()
@@ -55,7 +55,6 @@ class ReadingPlan:
     source: Source  #: The open file.
     expected: Expected  #: The robot's names and limits.
     mapping: Mapping  #: The mapping.
-    rule: LogTable  #: What holds for this log.
     #: Name in the log format to column of the file and the mapping's rule for it.
     sources: dict[str, tuple[str, ColumnTable]]
     ignored: tuple[str, ...]  #: Columns that mean nothing to the log format.
@@ -91,12 +90,10 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
     Raises:
         LegwattError: Columns are missing, occur twice after mapping, or belong to another robot.
     """
-    mapping = mapping or Mapping()
-    source = open_source(path)
+    mapping, source = mapping or Mapping(), open_source(path)
     sources: dict[str, tuple[str, ColumnTable]] = {}
-    ignored, owners = dict[str, str](), set[str]()
-    useless = dict.fromkeys(mapping.columns, "")  # patterns that give no column, and why
-    rules = mapping.rules
+    ignored, owners, rules = dict[str, str](), set[str](), mapping.rules
+    useless = dict.fromkeys(mapping.columns, "")  # patterns, and the unknown name that one gives
     for column in source.header:
         names = ((pattern, rule.renamed(pattern, column)) for pattern, rule in rules.items())
         pattern, own = next(((p, name) for p, name in names if name is not None), ("", column))
@@ -107,11 +104,7 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
         target = expected.columns.get(name)
         if target is None:
             ignored[column] = name
-            near = get_close_matches(name, expected.columns, n=1)
-            hint = f"; did you mean '{near[0]}'?" if near else ""
-            if pattern in useless:
-                useless[pattern] = f"column '{one_line(column)}' becomes '{one_line(name)}', "
-                useless[pattern] += f"which is none of the log format{hint}"
+            useless |= {pattern: name} if pattern in useless else {}
             continue
         if target.name in sources:
             raise LegwattError(
@@ -119,36 +112,31 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
                 "both give the same channel; keep one"
             )
         useless.pop(pattern, None)
-        sources[target.name] = column, _in_unit(rule, source, column, own, target, mapping.where)
-    for pattern, why in useless.items():
-        what = f"no column of {source.where} matches '{one_line(pattern)}'; "
-        raise LegwattError(f"{mapping.where}: {why or what + closest(pattern, source.header)}")
-    plan = ReadingPlan(source, expected, mapping, mapping.rule_for(path), sources, tuple(ignored))
+        _refuse_other_unit(rule.unit, target, f"{mapping.where}: column '{one_line(column)}'")
+        sources[target.name] = column, rule
+    for pattern, name in useless.items():
+        fact = f"no column of {source.where} matches it; {closest(pattern, source.header)}"
+        if name:
+            fact = f"'{one_line(name)}' is none of the log format; "
+            fact += closest(name, [*expected.columns])
+        raise LegwattError(f"{mapping.where}: columns '{one_line(pattern)}': {fact}")
+    for name, constant in mapping.constants.items():
+        known("constants: no column", name, expected.columns, mapping.where)
+        where = f"{mapping.where}: constants '{one_line(name)}'"
+        _refuse_other_unit(constant.unit, expected.columns[name], where)
+    plan = ReadingPlan(source, expected, mapping, sources, tuple(ignored))
     _refuse_unknown_names(plan, owners - {""})
     _refuse_missing(plan)
-    _refuse_slips(plan, source.where, ignored)
-    _refuse_slips(plan, mapping.where, {name: name for name in plan.rule.constants})
+    _refuse_slips(plan, ignored)
     return plan
 
 
-def _in_unit(
-    rule: ColumnTable, source: Source, column: str, name: str, target: Column, where: str
-) -> ColumnTable:
-    """The rule with the unit that the file's own row of units states, where the rule has none."""
-    stated = source.units.get(column)
-    if rule.unit is None and stated and dimension(stated) == dimension(target.unit):
-        if column == name and stated != target.unit:
-            raise LegwattError(
-                f"{source.where}: column '{one_line(column)}' is in '{stated}' by the row of "
-                "units, and in another by its name; rename it, or give its unit in a mapping file"
-            )
-        return rule.model_copy(update={"unit": stated})
-    if rule.unit not in (None, "1") and dimension(str(rule.unit)) != dimension(target.unit):
+def _refuse_other_unit(unit: str | None, target: Column, where: str) -> None:
+    if unit not in (None, "1") and dimension(str(unit)) != dimension(target.unit):
         raise LegwattError(
-            f"{where}: column '{one_line(column)}': '{rule.unit}' is a unit of "
-            f"{dimension(str(rule.unit))}, {target.quantity} needs one of {dimension(target.unit)}"
+            f"{where}: '{unit}' is a unit of {dimension(str(unit))}, {target.quantity} needs one "
+            f"of {dimension(target.unit)}"
         )
-    return rule
 
 
 def _refuse_unknown_names(plan: ReadingPlan, owners: set[str]) -> None:
@@ -165,20 +153,22 @@ def _refuse_unknown_names(plan: ReadingPlan, owners: set[str]) -> None:
         known(f"no joint of {robot.robot}:", joint, robot.joints, mapping.where)
 
 
-def _refuse_slips(plan: ReadingPlan, where: str, names: MappingType[str, str]) -> None:
-    """Refuse names one or two letters, or a unit, off those of a column that is not there.
+def _refuse_slips(plan: ReadingPlan, ignored: MappingType[str, str]) -> None:
+    """Refuse columns one or two letters, or a unit, off those of a column that is not there.
 
     A column that is left out for that would cost a channel, or a joint, without a word.
     """
     columns = plan.expected.columns
     missing = [name for name, target in columns.items() if target.name not in plan.sources]
-    for column, name in names.items():
-        for other in missing if "__" in name and name not in columns else ():
-            if _is_slip(name.lower(), other.lower()):
-                raise LegwattError(
-                    f"{where}: '{one_line(column)}' is none of the log format and would be "
-                    f"ignored; did you mean '{other}'? Give name and unit in a mapping file"
-                )
+    for column, name in ignored.items():
+        near = (
+            other for other in missing * ("__" in name) if _is_slip(name.lower(), other.lower())
+        )
+        if (other := next(near, None)) is not None:
+            raise LegwattError(
+                f"{plan.source.where}: '{one_line(column)}' is none of the log format and would be "
+                f"ignored; did you mean '{other}'? Give name and unit in a mapping file"
+            )
 
 
 def _is_slip(name: str, other: str) -> bool:
@@ -193,41 +183,32 @@ def _is_slip(name: str, other: str) -> bool:
 def _refuse_missing(plan: ReadingPlan) -> None:
     """Refuse a log without time, positions or efforts of this robot."""
     source, expected, mapping = plan.source, plan.expected, plan.mapping
-    where, rate, joints = source.where, mapping.time.sample_rate, plan.expected.joints
-    if rate is not None and "time" in plan.quantities:
-        raise LegwattError(
-            f"{mapping.where}: sample_rate is given and {where} has {TIME}; drop one"
-        )
-    if rate is None and "time" not in plan.quantities:
+    where, joints, there = source.where, expected.joints, {*plan.sources, *mapping.constants}
+    if mapping.time.sample_rate is None and TIME not in plan.sources:
         raise LegwattError(
             f"{where}: no column {TIME}; {closest(TIME, source.header)} Name it under [time] in a "
             "mapping file, or give its sample_rate there; `gap mapping` writes a first one"
         )
-    if not plan.quantities & {*POSITIONS}:
-        owners = {c.rpartition("__")[0] for c in source.header if "__position" in c}
+    sides = [[column_name(joint, quantity) for quantity in POSITIONS] for joint in joints]
+    wanted = [names[0] for names in sides if not {*names} & there]
+    strangers = [c for c in plan.ignored if "__position" in c]
+    if len(wanted) == len(joints) or (wanted and strangers):
         raise LegwattError(
-            f"{where}: none of the {len(joints)} joints of {expected.robot} ('{joints[0]}', ...) "
-            "has a position; the log of another robot? It has: "
-            f"{one_line(', '.join(sorted(owners) or source.header))}"
-        )
-    stated = {name.rpartition("__")[0] for name in plan.rule.constants}
-    sides = [[column_name(joint, q) for q in POSITIONS] for joint in joints if joint not in stated]
-    wanted = [names[0] for names in sides if not {*names} & {*plan.sources}]
-    strangers = [c for c in plan.ignored if c.endswith("position_rad")]
-    if strangers and wanted:
-        raise LegwattError(
-            f"{where}: no column '{wanted[0]}', {closest(wanted[0], strangers)} Give the joint's "
-            "name under [joints] of a mapping file, or where it stands under [constants]"
+            f"{where}: no column '{wanted[0]}', {closest(wanted[0], strangers or source.header)} "
+            "The log of another robot? Else give the joint's name under [joints] of a mapping "
+            "file, or where it stands under [constants]"
         )
     found = [c for c in EFFORTS if c in plan.quantities] + ["torque"] * plan.derives_torque
-    if not found and not plan.supply_alone:
+    if plan.supply_alone:
+        return
+    if not found:
         columns = ", ".join(column_name(joints[0], c) for c in EFFORTS)
-        goals = "goal_position" in plan.quantities
-        hint = "; or give the servos' gains under [pd_gains] in a mapping file" * goals
+        hint = "; or give the servos' gains under [pd_gains] in a mapping file"
         raise LegwattError(
-            f"{where}: no effort channel; at least one of {columns} must be there{hint}"
+            f"{where}: no effort channel; at least one of {columns} must be there"
+            f"{hint * ('goal_position' in plan.quantities)}"
         )
-    if mapping.effort is not None and not plan.supply_alone:
+    if mapping.effort is not None:
         known(f"effort is not in {where}:", mapping.effort, found, mapping.where)
 
 
@@ -241,13 +222,14 @@ def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> 
     mapping, found = plan.mapping, Findings(path.stem)
     wanted = [*(column for column, _ in plan.sources.values()), *mapping.torque_enabled.values()]
     data = plan.source.columns([*dict.fromkeys(wanted)])
-    for remark in plan.source.remarks:
-        found.note("", "file", 1, "1", "warning", remark)
+    if plan.source.remark:
+        found.note("", "file", 1, "1", "warning", plan.source.remark)
     frame = _in_si(plan, data)
     fresh = _fresh(frame[TIME], plan.source.where)
     if many := int((~fresh).sum()):
         text = f"{many} rows with the time of the row before were dropped"
         found.note("time_s", "repeated_times", many, "1", "warning", text)
+        data, frame = ({name: x[fresh] for name, x in old.items()} for old in (data, frame))
     feet, unused = _feet(frame, expected.feet)
     ratio = np.full(len(expected.joints), np.nan) if expected.ratio is None else expected.ratio
     named = zip(expected.joints, ratio.tolist(), strict=True)
@@ -255,20 +237,17 @@ def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> 
     at_motor = _sides(frame, plan, ratio, found)
     left_out = _stand_still(frame, plan)
     derived = _drive(plan, data, frame, found)
-    _warm(frame, expected.joints)
-    table = pd.DataFrame(frame, copy=False)
     log = Recording(
         name=path.stem,
-        frame=table if fresh.all() else table[fresh].reset_index(drop=True),
+        frame=pd.DataFrame(frame, copy=False),
         joints=expected.joints,
         effort="",
         at_motor=at_motor,
         feet=feet,
         ratio=ratio,
-        gain=plan.rule.gain_per_rad,
+        gain=mapping.controller.gain_per_rad,
         torque_off_bridge=mapping.controller.torque_off_bridge,
         left_out=left_out,
-        condition=dict(plan.rule.condition),
         derived=derived,
         findings=tuple(found),
         ignored=(*plan.ignored, *(plan.sources[name][0] for name in unused)),
@@ -280,49 +259,43 @@ def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> 
 
 def _fresh(time: Array, where: str) -> Mask:
     """Rows (N,) with a time of their own; a LegwattError for times that are none or run back."""
-    bad, step = ~np.isfinite(time), np.diff(time)
+    bad = ~np.isfinite(time)
+    bad[1:] |= np.diff(time) < 0
     if bad.any():
+        k = int(np.argmax(bad))
         raise LegwattError(
-            f"{where}: row {int(np.argmax(bad)) + 2}: time is empty or not finite; drop the row"
+            f"{where}: row {k + 2}: time {time[k]:.9g} s is no number, or before that of the row "
+            "above; drop the row, or sort the rows by time"
         )
-    if (step < 0).any():
-        k = int(np.argmax(step < 0))
-        raise LegwattError(
-            f"{where}: row {k + 3}: time {time[k + 1]:.9g} s comes after {time[k]:.9g} s; sort the "
-            "rows by time"
-        )
-    if time.size > 1 and not (step > 0).any():
-        raise LegwattError(f"{where}: time never changes from {time[0]:.9g} s")
-    return np.concatenate([[True], step > 0])
+    return np.diff(time, prepend=-np.inf) > 0
 
 
 def _in_si(plan: ReadingPlan, data: MappingType[str, Array]) -> Columns:
     """Every column of the file, and constants that stand for one, (N,) in the log's unit."""
     columns, out, n = plan.expected.columns, Columns(), next(iter(data.values())).size
     if plan.mapping.time.sample_rate is not None:
-        out[TIME] = np.arange(n) / plan.mapping.time.sample_rate.si
+        out[TIME] = np.arange(n) / plan.mapping.time.sample_rate
     # Time first: columns that are late are read off at other times.
     for name, (column, rule) in sorted(plan.sources.items(), key=lambda s: s[0] != TIME):
+        if name in out:  # a rate outranks stamps
+            continue
         factor, offset = rule.affine(columns[name].unit)
         values = data[column]
         if (factor, offset) != (1.0, 0.0):
-            with np.errstate(over="ignore", invalid="ignore"):  # told below
+            with np.errstate(over="ignore", invalid="ignore"):
                 values = factor * values + offset
-        bad = np.abs(values) > _LARGEST  # infinities too; NaN is an empty cell
-        if bad.any() and name != TIME:
-            row = int(np.argmax(bad))
-            raise LegwattError(
-                f"{plan.source.where}: row {row + 2}, column '{one_line(column)}' holds "
-                f"{data[column][row]:g}; no sensor reads that, leave the cell empty, or mend its "
-                "unit in a mapping file"
-            )
+        if name != TIME:  # infinities and numbers that no sensor reads are empty cells
+            values = np.where(np.abs(values) <= _LARGEST, values, np.nan)
         if rule.late and name != TIME:
             at = out[TIME] + rule.late
             values = np.interp(at, out[TIME], values, left=np.nan, right=np.nan)
+        if columns[name].quantity == "temperature" and _live(values):  # cells between may be empty
+            told = np.isfinite(values)
+            values = np.asarray(np.interp(out[TIME], out[TIME][told], values[told]))
         out[name] = values
-    for name, quantity in plan.rule.constants.items():
-        if name in columns and name not in out:
-            out[name] = np.full(n, from_si(quantity.si, columns[name].unit))
+    for name, quantity in plan.mapping.constants.items():
+        target = columns[name]
+        out.setdefault(target.name, np.full(n, from_si(quantity.si, target.unit)))
     return out
 
 
@@ -334,34 +307,27 @@ def _live(x: Array | None) -> TypeGuard[Array]:
 def _sides(frame: Columns, plan: ReadingPlan, ratios: Array, found: Findings) -> bool:
     """Bring positions to the joint's side; True where every one was measured at the motor.
 
-    A gear ratio that is not known (J,) comes from the two positions.
+    Two positions tell a gear ratio (J,) that is not known, or another one.
     """
     names = [tuple(column_name(joint, q) for q in POSITIONS) for joint in plan.expected.joints]
-    any_own = any(place in frame for place, _ in names)
+    at_motor = not any(place in frame for place, _ in names)
     for (place, column), ratio in zip(names, ratios.tolist(), strict=True):
-        motor, here, remark = frame.pop(column, None), frame.get(place), ""
+        motor, here = frame.pop(column, None), frame.get(place)
         if not _live(motor):
             continue
-        here = here if _live(here) else None
-        seen, stated = None if here is None else _slope(motor, here), np.isfinite(ratio)
-        if seen is not None and not (stated and abs(seen / ratio - 1.0) <= _CONTRADICTS):
-            files = f"{ratio:.6g} by the files" if stated else "no file states it"
-            remark, ratio = f"gear ratio {seen:.6g} by the two positions, {files}", seen
-        elif not stated:
+        seen = _slope(motor, here) if _live(here) else None
+        if seen is not None and not abs(seen / ratio - 1.0) <= _CONTRADICTS:
+            detail = f"gear ratio {seen:.6g} by the two positions, {ratio:.6g} by the files"
+            found.note(column, "side", seen, "1", "warning", detail)
+            ratio = seen
+        elif np.isnan(ratio):
             raise LegwattError(
                 f"{plan.source.where}: {column} is at the motor and no gear ratio is known; give "
                 "actuators, or the ratio under [gear_ratio] in a mapping file, 1 where it is "
                 "divided by it already"
             )
-        elif any_own and here is None:
-            remark = (
-                "has a motor-side position alone, other joints have a joint-side one: what "
-                "its gear winds up or plays is taken for the joint's motion"
-            )
-        frame[place if here is None else column] = motor / ratio
-        if remark:
-            found.note(column, "side", 1, "1", "warning", remark)
-    return not any_own
+        frame[column if _live(here) else place] = motor / ratio
+    return at_motor
 
 
 def _slope(motor: Array, joint: Array) -> float | None:
@@ -411,7 +377,7 @@ def _drive(
     for joint, column in plan.mapping.torque_enabled.items():
         frame[f"{joint}__{OFF}"] = ~(data[column] > 0.5)
     if gains is not None and plan.derives_torque:
-        derived["torque"] = gains.words(plan.quantities)
+        derived["torque"] = LAW
         wanted = ("position", "velocity", "goal_position", "goal_velocity", "goal_torque")
         for joint in joints:
             named = {q: column_name(joint, q) for q in wanted}
@@ -425,13 +391,3 @@ def _drive(
         none = np.full(frame[TIME].size, np.nan)
         frame |= {column_name(joint, "torque"): none for joint in joints}
     return derived
-
-
-def _warm(frame: Columns, joints: tuple[str, ...]) -> None:
-    """Temperatures of joints, the machine's own where one has none; straight between samples."""
-    common, time = frame.pop(column_name("base", "base_temperature"), None), frame[TIME]
-    for name in (column_name(joint, "temperature") for joint in joints):
-        mine = frame.get(name)
-        mine = mine if _live(mine) else common
-        if _live(mine):
-            frame[name] = np.interp(time, time[np.isfinite(mine)], mine[np.isfinite(mine)])

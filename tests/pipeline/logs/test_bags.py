@@ -93,7 +93,6 @@ def test_publishers_with_stamps_of_their_own_are_brought_to_one_clock(
     told = np.isfinite(log.position[:, 1])
     assert np.flatnonzero(~told).tolist() == [0, *range(1, 200, 2)]  # no message is near these
     assert np.allclose(log.position[told, 1], held[told], atol=1e-12)
-    assert "brought to those of the others" in log.findings[0].detail
 
 
 def test_what_cannot_be_read_is_one_line(columns, two_joints, tmp_path, monkeypatch):
@@ -108,7 +107,7 @@ def test_what_cannot_be_read_is_one_line(columns, two_joints, tmp_path, monkeypa
     (tmp_path / "empty").mkdir()
     refused(tmp_path / "empty", "without files of a bag")
     wrong = [(t, s, r, n, {**x, "position": [1.0]}) for t, s, r, n, x in sent(columns)[:3]]
-    refused(write_bag(tmp_path / "few", wrong), "1 numbers for 2 names")
+    refused(write_bag(tmp_path / "few", wrong), "1, 2, 2 numbers for 2 names")
     none = write_bag(tmp_path / "none", sent(columns)[:1]) / "none.mcap"
     other = tmp_path / "other.mcap"
     other.write_bytes(none.read_bytes().replace(b"msg/JointState", b"msg/JointStatf"))

@@ -49,7 +49,7 @@ def test_rename_scale_flip_zero_and_unit(columns, read):
     assert log.of(log.effort)[:, 1] == pytest.approx(columns["b__torque_Nm"])
 
 
-def test_what_holds_for_some_logs_and_rows_with_the_drive_off(columns, read):
+def test_constants_and_rows_with_the_drive_off(columns, read):
     columns["on"] = np.where(columns["time_s"] < 2.0, 1.0, 0.0)
     rules = """
         [controller]
@@ -58,16 +58,11 @@ def test_what_holds_for_some_logs_and_rows_with_the_drive_off(columns, read):
         supply__voltage_V = {value = 7.4, unit = "V"}
         [torque_enabled]
         a = "on"
-        [[logs]]
-        match = "log*"
-        gain_per_rad = 3
-        condition = {gain = 3, load = "none"}
         """
     log = read(columns, rules)
     assert log.torque_off[-1].tolist() == [True, False]
     assert log.of("supply") == pytest.approx(7.4)
-    assert log.gain == 3.0
-    assert log.condition == {"gain": 3.0, "load": "none"}
+    assert log.gain == 2.0
 
 
 @pytest.mark.parametrize("separator", [";", " "])
@@ -89,12 +84,10 @@ def test_separators_and_decimal_commas_are_told_by_the_file(
         ("efort = 'torque'", ("efort", "did you mean 'effort'")),
         ("effort = 'tork'", ("tork",)),
         ("[columns.x]\nunit = 'degrees'", ("degrees", "unknown unit")),
-        ("[columns.x]\nas = '*__position_rad'", ("star",)),
         ("[columns.x]\nscale = 0", ("scale", "zero")),
-        ("[time]\nsample_rate = {value = -5, unit = 'Hz'}", ("sample_rate", "greater than 0")),
-        ("[time]\ncolumn = 't'\nsample_rate = {value = 5, unit = 'Hz'}", ("not both",)),
+        ("[time]\nsample_rate = -5", ("sample_rate", "greater than 0")),
+        ("[time]\ncolumn = 't'\nsample_rate = 5", ("not both",)),
         ("[controller]\ntorque_off_bridge = 'opn'", ("did you mean 'open'",)),
-        ("[logs]\nmatch = 'x'", ("two brackets",)),
         ("[constants.a__temperature_degC]\nvalue = 3\nunit = 'N'", ("a unit of force",)),
         ("[columns.nothing]\nas = 'a__power_W'", ("nothing", "log.csv")),
         ("[columns.a__torque_Nm]\nas = 'a__torq_Nm'", ("did you mean 'a__torque_Nm'",)),
@@ -102,7 +95,6 @@ def test_separators_and_decimal_commas_are_told_by_the_file(
         ("[columns.a__torque_Nm]\nas = 'b__torque_Nm'", ("same channel",)),
         ("[torque_enabled]\nc = 'a__torque_Nm'", ("'c'", "no joint of two")),
         ("effort = 'voltage'", ("voltage",)),
-        ("[time]\nsample_rate = {value = 5, unit = 'Hz'}", ("drop one",)),
         ("[time]\ncolumn = 'tme_s'", ("time: log.csv has no column 'tme_s'", "time_s")),
         ("[joints]\nshoulder = 'a'", ("no column of log.csv is of 'shoulder'",)),
         ("[constants.a__temperatur_degC]\nvalue = 3\nunit = 'degC'", ("did you mean 'a__temp",)),
@@ -135,7 +127,7 @@ def test_the_law_gives_back_the_torque_that_was_asked_for(targets, columns, read
     torque = log.of(log.effort)
     for j, joint in enumerate("ab"):
         assert np.allclose(torque[:, j], columns[f"{joint}__torque_Nm"], atol=1e-9)
-    assert log.derived == {"torque": "kp (goal - position) + kd (0 - velocity)"}
+    assert "kp (goal - position)" in log.derived["torque"]
     found = [f for f in judge(log, two_joints)[0] if f.verdict == "warning"]
     assert any("not measured" in f.detail for f in found)
 
