@@ -12,7 +12,8 @@ from typing import Any
 from pipeline.commands.gap import order_of
 from pipeline.commands.main import main, parser
 from pipeline.commands.robots import machine_of, walking_machine
-from pipeline.effects.model_file import ModelFile
+from pipeline.effects.base import EFFECTS
+from pipeline.effects.model_file import Edit, ModelFile
 from pipeline.identification.workflow.compared import Order, compared_machine
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot_file import load_robot_file
@@ -116,6 +117,22 @@ def as_asked(words: Sequence[str]) -> tuple[Order, Machine]:
 def walked_by(verb: str, *words: str) -> Machine:
     """A machine as ``walk`` or ``reports`` has it."""
     return walking_machine(parser(verb).parse_args([verb, *words]))
+
+
+def edit_of(
+    effect: str, *place: str, within: float = 0.1, unit: str = "current", **values: float
+) -> Edit:
+    """An effect as a log would have shown it, in a unit of efforts, each value within a share."""
+    rows = {
+        name: {
+            "value": x,
+            "unit": EFFECTS[effect].unit(name, unit),
+            "interval": (x - within * abs(x), x + within * abs(x)),
+        }
+        for name, x in values.items()
+    }
+    made = {"effect": effect, "place": place, "source": "log.csv", "parameters": rows}
+    return Edit.model_validate(made)
 
 
 def base_model(file: ModelFile) -> MachineModel:

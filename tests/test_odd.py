@@ -25,15 +25,6 @@ ROOT: Final = Path(__file__).parents[1]
 NUMBER: Final = re.compile(r"(?<![\w.])-?\d+\.?\d*(?:[eE][+-]?\d+)?")
 ODD_NUMBERS: Final = ("nan", "inf", "-1", "0", "1e300", "1e-300", "", "true", '"x"', "1,5", "--")
 UNITS: Final = ("mm", "m", "deg", "rad", "kg", "g", "s", "N*m", "mN*m", "A", "V", "rpm", "ohm", "W")
-PENDULUM: Final = """<robot name="pendulum">
-  <link name="base"/>
-  <link name="arm"><inertial><origin xyz="0.2 0 0"/><mass value="1.2"/>
-    <inertia ixx="0.001" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="shoulder" type="revolute"><parent link="base"/><child link="arm"/>
-    <axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="20" velocity="9"/></joint>
-</robot>
-"""
-
 
 #: One command, and what was spoilt.
 Case = tuple[tuple[str, ...], str]
@@ -43,9 +34,9 @@ def pendulum_log(path: Path) -> None:
     """Eight seconds of a swinging arm with friction, in the log format."""
     t = np.arange(0.0, 8.0, 0.01)
     q, v, a = 0.8 * np.sin(3 * t), 2.4 * np.cos(3 * t), -7.2 * np.sin(3 * t)
-    torque = (0.02 + 1.2 * 0.04) * a - 1.2 * 9.81 * 0.2 * np.cos(q) + 0.3 * np.sign(v)
+    torque = 0.49 * (0.1**2 * a + 9.81 * 0.1 * np.sin(q)) + 0.03 * np.sign(v)
     columns = {"position_rad": q, "velocity_rad_s": v, "torque_Nm": torque}
-    table = pd.DataFrame({f"shoulder__{name}": x for name, x in columns.items()})
+    table = pd.DataFrame({f"pendulum_joint__{name}": x for name, x in columns.items()})
     table.insert(0, "time_s", t)
     table.round(6).to_csv(path, index=False)
 
@@ -56,14 +47,13 @@ def written(folder: Path) -> None:
         shutil.copyfile(ROOT / "urdf" / name, folder / name)
     shutil.copytree(ROOT / "actuators" / "catalog", folder / "actuators")
     shutil.copytree(ROOT / "actuators" / "components", folder / "parts")
-    (folder / "pendulum.urdf").write_text(PENDULUM)
+    shutil.copyfile(ROOT / "tests/pipeline/data_files/xl330.urdf", folder / "pendulum.urdf")
     pendulum_log(folder / "log.csv")
     gait = 'extends = "hexapod.toml"\n[gait]\ntransfer_path = "cubic"\nslope_forward = "2 deg"\n'
     (folder / "gait.toml").write_text(gait)
     shutil.copyfile(ROOT / "pipeline/choice/day.csv", folder / "mission.csv")
-    (folder / "mapping.toml").write_text(
-        '[columns."shoulder__torque_Nm"]\nscale = 1.0\nunit = "N*m"\n'
-    )
+    mapping = '[columns."pendulum_joint__torque_Nm"]\nscale = 1.0\nunit = "N*m"\n'
+    (folder / "mapping.toml").write_text(mapping)
 
 
 #: Verb and its words; ``FILE`` in braces is a file that may be spoilt, `{}` an option's value.

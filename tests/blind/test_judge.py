@@ -82,16 +82,14 @@ ZERO, GAIN = ("position_offset", "joint_1"), ("effort_gain", "joint_1__torque_Nm
         (ALIKE, [name(*ZERO, rivals=("base_tilt",), angle=0.1)], ["class"], True),
     ],
 )
-def test_names_are_judged_straight(
-    known: dict[str, Any], names: list[Name], expected: list[str], seen: bool | None
-) -> None:
+def test_names_are_judged_straight(known, names, expected, seen):
     got = [verdict(known, one)[0] for one in names]
     assert got == expected
     for one in known["hidden"]:
         assert found(known, one, [*zip(names, got, strict=True)]) == seen
 
 
-def test_an_interval_covers_what_it_holds_and_one_of_no_width_nothing() -> None:
+def test_an_interval_covers_what_it_holds_and_one_of_no_width_nothing():
     (one,) = COULOMB["hidden"]
     assert coverage(name(*DRY, torque=0.45), one) == (1, 1)
     thin = Name("coulomb_friction", ("joint_1",), "confirmed", {"torque": (0.4, 0.4, 0.4)})
@@ -101,7 +99,7 @@ def test_an_interval_covers_what_it_holds_and_one_of_no_width_nothing() -> None:
     assert coverage(loss, LOAD["hidden"][0]) == (2, 2)
 
 
-def test_model_file_and_classes_are_read() -> None:
+def test_model_file_and_classes_are_read():
     candidates = (
         "effect,joint,place,verdict\n"
         "coulomb_friction,joint_1,joint_1,accepted\n"
@@ -114,7 +112,7 @@ def test_model_file_and_classes_are_read() -> None:
     assert read_names({"candidates.csv": candidates}) == []
 
 
-def test_rates_count_what_they_say() -> None:
+def test_rates_count_what_they_say():
     other = MODEL.replace("coulomb_friction", "viscous_friction").replace("joint_1", "joint_2")
     load = MODEL.replace("coulomb_friction", "link_mass").replace("torque", "mass")
     load = load.replace("joint_1", "link_3").replace("0.5", "2.05")

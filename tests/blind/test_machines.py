@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -35,7 +34,7 @@ def followed(name: str, plant_of):
 
 
 @pytest.mark.parametrize("name", ["pendulum", "leg", "arm"])
-def test_without_dry_friction_both_sources_give_the_same_torque(name: str) -> None:
+def test_without_dry_friction_both_sources_give_the_same_torque(name):
     def smooth(plant: Plant) -> Plant:
         return replace(plant, inertia=0.05 + plant.inertia).at(0, viscous=0.3, quadratic=0.2)
 
@@ -44,7 +43,7 @@ def test_without_dry_friction_both_sources_give_the_same_torque(name: str) -> No
     np.testing.assert_allclose(happened.torque, inverse.torque, atol=1e-9 * size)
 
 
-def test_a_gear_winds_up_alike_in_both_sources_and_a_play_is_as_wide_as_it_says() -> None:
+def test_a_gear_winds_up_alike_in_both_sources_and_a_play_is_as_wide_as_it_says():
     happened, inverse = followed("leg", lambda p: p.at(1, compliance=2e-3, inertia=0.05))
     one, two = (x.motor[:, 1] - x.q[:, 1] for x in (happened, inverse))
     # The engine's gear has a loss of its own, a twentieth of critical damping.
@@ -54,7 +53,7 @@ def test_a_gear_winds_up_alike_in_both_sources_and_a_play_is_as_wide_as_it_says(
     assert 0.009 < np.abs(happened.motor - happened.q).max() < 0.0115
 
 
-def test_dry_friction_of_the_engine_takes_the_work_it_should() -> None:
+def test_dry_friction_of_the_engine_takes_the_work_it_should():
     """Energy: what the motors gave is in the bodies, or friction took it."""
     law = {"coulomb": 0.5, "driving": 0.1, "driven": 0.1}
     happened, _ = followed("pendulum", lambda plant: plant.at(0, **law))
@@ -64,7 +63,7 @@ def test_dry_friction_of_the_engine_takes_the_work_it_should() -> None:
     assert taken == pytest.approx(np.sum((0.5 + 0.1 * np.abs(link)) * np.abs(v)), rel=0.02)
 
 
-def test_bristles_slide_at_the_level_of_the_law() -> None:
+def test_bristles_slide_at_the_level_of_the_law():
     _, plant = machine("pendulum")
     law = plant.at(0, coulomb=1.0, excess=0.5, stribeck=0.2, asymmetry=0.2, driving=0.1)
     t = np.arange(2000) * 1e-3
@@ -75,7 +74,7 @@ def test_bristles_slide_at_the_level_of_the_law() -> None:
         assert got[row, 0] == pytest.approx(way * dry, rel=1e-6)
 
 
-def test_a_trial_hangs_on_source_seed_and_number_alone(tmp_path: Path) -> None:
+def test_a_trial_hangs_on_source_seed_and_number_alone(tmp_path):
     one, two = (make("own", 2, 6, tmp_path / name) for name in ("one", "two"))
     assert one == two
     for name in ("log.csv", "machine.urdf", "mapping.toml", "test.csv"):
@@ -84,7 +83,7 @@ def test_a_trial_hangs_on_source_seed_and_number_alone(tmp_path: Path) -> None:
     assert make("own", 2, 7, tmp_path / "three") != one
 
 
-def test_a_log_shows_what_is_hidden_and_which_names_look_like_it(tmp_path: Path) -> None:
+def test_a_log_shows_what_is_hidden_and_which_names_look_like_it(tmp_path):
     assert KINDS.count("outside") == KINDS.count("empty") == len(KINDS) / 5
     effects = ("coulomb_friction", "joint_elasticity", "parallel_spring")
     truth = make("own", 4, 1, tmp_path / "t", machine="leg", effects=effects)
@@ -94,9 +93,7 @@ def test_a_log_shows_what_is_hidden_and_which_names_look_like_it(tmp_path: Path)
     assert {"rigid_body_parameters", "link_mass"} <= set(truth["hidden"][0]["alike"])
 
 
-def test_rows_are_the_same_whatever_the_workers_and_after_a_resume(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_rows_are_the_same_whatever_the_workers_and_after_a_resume(tmp_path, monkeypatch):
     one = run_trials(["own"], 3, 3, tmp_path / "one", ask=answer)
     assert one == run_trials(["own"], 3, 3, tmp_path / "two", workers=2, ask=answer)
     # Killed in the second trial: half a line is left of it.
@@ -109,9 +106,7 @@ def test_rows_are_the_same_whatever_the_workers_and_after_a_resume(
     assert made == [1, 2]
 
 
-def test_the_command_writes_its_tables_and_prints_the_rates(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_writes_its_tables_and_prints_the_rates(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(command, "run_trials", partial(run_trials, ask=answer))
     arguments = ["--trials", "2", "--workers", "1", "--seed", "3", "--out", str(tmp_path)]
     assert command.main(arguments) == 1
@@ -120,9 +115,7 @@ def test_the_command_writes_its_tables_and_prints_the_rates(
     assert "of    2  100.0% (34.2% to 100.0%)  answered" in capsys.readouterr().out
 
 
-def test_gap_answers_a_short_trial_and_names_what_is_hidden(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_gap_answers_a_short_trial_and_names_what_is_hidden(tmp_path, monkeypatch):
     monkeypatch.setattr(trial, "SECONDS", (8.0, 4.0))
     truth = trial.make("own", 3, 0, tmp_path, machine="leg", effects=("viscous_friction",))
     row, names = judged(truth, ask(tmp_path, truth["options"]))
@@ -132,9 +125,7 @@ def test_gap_answers_a_short_trial_and_names_what_is_hidden(
 
 
 @pytest.mark.parametrize("options", [["--supply"], ["--machine", "pendulum", "--hide", "backlash"]])
-def test_a_log_is_written_into_a_new_folder_only(
-    tmp_path: Path, options: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_log_is_written_into_a_new_folder_only(tmp_path, options, capsys):
     folder = tmp_path / "my trial"
     assert command.main(["--write", str(folder), *options]) == 0
     assert {path.name for path in folder.iterdir()} == {"given", "truth.json"}
@@ -152,9 +143,7 @@ def test_a_log_is_written_into_a_new_folder_only(
         ("--trials 0 --out", "--trials and --workers start at 1"),
     ],
 )
-def test_what_cannot_be_done_is_one_line_and_writes_nothing(
-    tmp_path: Path, options: str, words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_cannot_be_done_is_one_line_and_writes_nothing(tmp_path, options, words, capsys):
     assert command.main([*options.split(), str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
     assert words in error

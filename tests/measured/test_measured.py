@@ -61,7 +61,7 @@ def test_the_range_holds_what_the_plain_calls_give_at_every_choice(tmp_path):
         held = lw.stand(machine.with_values(values), "solo12").result.holding["solo12"]
         by_hand[pose, a, b] = float(held.power.sum())
     for choice, watts in predicted(small, small["quantity"][0]).items():
-        assert watts == pytest.approx(by_hand[choice], rel=1e-9)  # type: ignore[index]
+        assert watts == pytest.approx(by_hand[choice], rel=1e-9)
     power, moon = of_robot("small", small, tmp_path).to_dict("records")
     assert power["least"] == pytest.approx(10 / max(by_hand.values()))
     assert power["likeliest"] == pytest.approx(15 / by_hand[0, 0, 0])

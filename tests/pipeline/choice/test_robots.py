@@ -65,7 +65,7 @@ def search_of(
     problem = Problem(machine, modes, groups, shelf, 0.3, load_parts()[PACK], OPEN)
     demand = demand_of(problem, dict.fromkeys(groups, 0.3))
     for tracks in demand.groups.values():
-        tracks[:] = [track if track.mode.stands else thinned(track, step) for track in tracks]  # type: ignore[index]
+        tracks[:] = [track if track.mode.stands else thinned(track, step) for track in tracks]
     return Search(problem, combinations(shelf, pairs), demand)
 
 
@@ -183,7 +183,7 @@ def test_no_answer_has_a_part_that_is_sold_inside_another_product_alone(search):
     none = {r for r in search.known if not any(brake for *_, brake in r)} & {*search.within}
     best = min(search.known[robot].power for robot in none)
     assert plain.known[front[0]].power <= best * (1 + 1e-9)
-    assert ALL in envelope(plain).power  # type: ignore[union-attr]
+    assert ALL in envelope(plain).power
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=SLOW) for k in range(1, 9))])
@@ -204,7 +204,7 @@ def test_more_parts_make_no_end_of_the_front_worse(thin, seed):
 def test_no_robot_found_names_group_limit_mode_and_by_how_much():
     heavy = search_of(("maxon_614949", "hd_csg_20_160"))
     for tracks in heavy.demand.groups.values():  # its own mass is too much for it
-        tracks[:] = [replace(t, slope=3.0 * t.slope) for t in tracks]  # type: ignore[index]
+        tracks[:] = [replace(t, slope=3.0 * t.slope) for t in tracks]
     words = heavy.run().closest()
     assert "\n" not in words
     assert re.search(

@@ -1,9 +1,8 @@
 """The Python API says what the command line writes; sweeps lose and repeat nothing."""
 
 import doctest
+import os
 import signal
-import subprocess
-import sys
 from pathlib import Path
 from threading import Timer
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 import pandas
 import pandas as pd
 import pytest
+from distributed import Client, LocalCluster
 
 import pipeline as lw
 from actuators.errors import LegwattError
@@ -205,27 +205,12 @@ def test_the_command_writes_table_figure_and_record_alone(tmp_path):
 
 @pytest.mark.slow
 def test_a_cluster_gives_the_same_rows_though_a_worker_is_killed(tmp_path):
-    vary = ["speed=0.02:0.12:20 m/s"]
-    started: list[subprocess.Popen[str]] = []
-
-    def dask(kind: str, *arguments: str) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *arguments]
-        started.append(subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True))
-        return started[-1]
-
-    try:
-        scheduler = dask("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
-        assert scheduler.stderr
-        address = next(line.split()[-1] for line in scheduler.stderr if "Scheduler at:" in line)
-        options = (address, "--nthreads", "1", "--no-nanny", "--no-dashboard")
-        first, _ = dask("worker", *options), dask("worker", *options)
-        Timer(4.0, first.kill).start()
-        spread_out = run(tmp_path / "spread", vary, workers=address)
-        assert first.wait(timeout=30) == -signal.SIGKILL
-    finally:
-        for process in started:
-            process.kill()
-            process.communicate()
+    vary, alone = ["speed=0.02:0.12:20 m/s"], {"threads_per_worker": 1, "dashboard_address": None}
+    with LocalCluster(n_workers=2, **alone) as cluster, Client(cluster) as client:
+        first = min(client.run(os.getpid).values())
+        Timer(4.0, os.kill, (first, signal.SIGKILL)).start()
+        spread_out = run(tmp_path / "spread", vary, workers=cluster.scheduler_address)
+        assert first not in client.run(os.getpid).values()
     assert spread_out.rows.equals(run(tmp_path / "alone", vary).rows)
 
 

@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import pipeline as lw
 from actuators.loading.build import load_catalog
 from pipeline.commands.robots import changes_of
 from pipeline.robot.robot_file import load_robot_file
-from tests.command_line import exit_code, own_robot, record_of, rows_of
+from tests.command_line import exit_code, own_robot, record_of
 from tests.reports.test_page import checked
 
 
@@ -51,6 +52,15 @@ def test_losses_and_work_add_up_over_the_cycle(out):
     assert ((net["el"] - net["out"] - heat).abs() <= 1e-4 * ends.sum(axis=1)).all()
 
 
+RPY = "roll_rad pitch_rad yaw_rad"
+#: Of the base, which has no angular acceleration.
+RATES = (
+    "velocity_x_m_s velocity_y_m_s velocity_z_m_s",
+    "angular_velocity_x_rad_s angular_velocity_y_rad_s angular_velocity_z_rad_s",
+    "acceleration_x_m_s2 acceleration_y_m_s2 acceleration_z_m_s2",
+)
+
+
 @pytest.mark.parametrize(
     "gait",
     [
@@ -66,41 +76,35 @@ def test_anyone_can_check_torque_from_the_tables_alone(root, tmp_path, gait):
     options = [word for change in gait for word in ("--set", f"gait.{change}")]
     out = tmp_path / "walk"
     assert exit_code(["walk", "--samples", "51", "--out", str(out), *options]) == 0
-    tables = [rows_of(out / f"walking_{t}.csv") for t in ("base", "joint_demand", "contact_forces")]
+    names = ("base", "joint_demand", "contact_forces")
+    base, joints, forces = (pd.read_csv(out / f"walking_{name}.csv") for name in names)
     model = pin.buildModelFromUrdf(str(spec.urdf), pin.JointModelFreeFlyer())
     data, world = model.createData(), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    ids = {joint: model.joints[model.getJointId(joint)] for joint in spec.joints}
-    for base, joints, forces in zip(*tables, strict=True):
-        at, rpy, velocity, spin, acceleration = (
-            np.array([float(base[f"base__{name}"]) for name in names])
-            for names in (
-                [f"{axis}_m" for axis in "xyz"],
-                ["roll_rad", "pitch_rad", "yaw_rad"],
-                [f"velocity_{axis}_m_s" for axis in "xyz"],
-                [f"angular_velocity_{axis}_rad_s" for axis in "xyz"],
-                [f"acceleration_{axis}_m_s2" for axis in "xyz"],
-            )
-        )
-        turn = pin.rpy.rpyToMatrix(rpy)
+    places = [model.joints[model.getJointId(joint)] for joint in spec.joints]
+    at_q, at_v = ([getattr(p, key) for p in places] for key in ("idx_q", "idx_v"))
+
+    def columns(table: pd.DataFrame, of: Sequence[str], names: str) -> np.ndarray:
+        return table[[f"{own}__{name}" for own in of for name in names.split()]].to_numpy()
+
+    place, rpy = columns(base, ["base"], "x_m y_m z_m"), columns(base, ["base"], RPY)
+    velocity, spin, acceleration = (columns(base, ["base"], three) for three in RATES)
+    angle, rate, change, given = (
+        columns(joints, spec.joints, name)
+        for name in ("position_rad", "velocity_rad_s", "acceleration_rad_s2", "torque_Nm")
+    )
+    force = columns(forces, spec.leg_names, "force_x_N force_y_N force_z_N")
+    for k in range(len(base)):
+        turn = pin.rpy.rpyToMatrix(rpy[k])
         q, v, a = pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv)
-        q[:3], q[3:7] = at, pin.Quaternion(turn).coeffs()
-        v[:6] = np.concatenate([turn.T @ velocity, turn.T @ spin])
-        a[:3] = turn.T @ acceleration - np.cross(v[3:6], v[:3])  # no angular acceleration
-        for joint, place in ids.items():
-            q[place.idx_q] = float(joints[f"{joint}__position_rad"])
-            v[place.idx_v] = float(joints[f"{joint}__velocity_rad_s"])
-            a[place.idx_v] = float(joints[f"{joint}__acceleration_rad_s2"])
+        q[:3], q[3:7], q[at_q] = place[k], pin.Quaternion(turn).coeffs(), angle[k]
+        v[:6], v[at_v] = np.concatenate([turn.T @ velocity[k], turn.T @ spin[k]]), rate[k]
+        a[:3], a[at_v] = turn.T @ acceleration[k] - np.cross(v[3:6], v[:3]), change[k]
         torque = pin.rnea(model, data, q, v, a)
-        for leg in spec.legs:
+        for leg, own in zip(spec.legs, force[k].reshape(-1, 3), strict=True):
             frame = model.getFrameId(leg.foot)
-            jacobian = pin.computeFrameJacobian(model, data, q, frame, world)[:3]
-            force = [float(forces[f"{leg.name}__force_{axis}_N"]) for axis in "xyz"]
-            torque -= jacobian.T @ force
-        # Nothing but the ground carries the base.
-        np.testing.assert_allclose(torque[:6], 0, atol=1e-7)
-        for joint, place in ids.items():
-            given = float(joints[f"{joint}__torque_Nm"])
-            assert torque[place.idx_v] == pytest.approx(given, abs=1e-8)
+            torque -= pin.computeFrameJacobian(model, data, q, frame, world)[:3].T @ own
+        np.testing.assert_allclose(torque[:6], 0, atol=1e-7)  # the ground alone carries the base
+        np.testing.assert_allclose(torque[at_v], given[k], atol=1e-8)
 
 
 FIGURES = (

@@ -12,7 +12,7 @@ import pytest
 
 from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
-from pipeline.effects.base import COMPETING, EFFECTS, Effect, Place
+from pipeline.effects.base import COMPETING, EFFECTS, Place
 from pipeline.effects.drivetrain import BareCoupling
 from pipeline.effects.model_file import (
     Edit,
@@ -23,7 +23,7 @@ from pipeline.effects.model_file import (
     read_model_file,
 )
 from pipeline.machine.machine import MachineModel
-from tests.command_line import base_model
+from tests.command_line import base_model, edit_of
 
 #: Places of the leg, by kind.
 PLACES: Mapping[str, Place] = {
@@ -44,21 +44,7 @@ SHAPES: Mapping[str, Mapping[str, float]] = {
     "transmission_coupling": {"ratio": -1.0},
     "link_mass": {"x": 0.1, "y": -0.02, "z": 0.3},
 }
-FRICTION = EFFECTS["coulomb_friction"]
 NUMBER = re.compile(r"(?<!\w)(-?\d+\.?\d*(?:e[-+]?\d+)?)")
-
-
-def edit_of(effect: Effect, values: Mapping[str, float], channel: str = "current") -> Edit:
-    rows = {
-        name: {
-            "value": v,
-            "unit": effect.unit(name, channel),
-            "interval": (v - 0.1 * abs(v), v + 0.1 * abs(v)),
-        }
-        for name, v in values.items()
-    }
-    made = {"effect": effect.name, "place": PLACES[effect.place_kind], "source": "log.csv"}
-    return Edit.model_validate({**made, "parameters": rows})
 
 
 @pytest.fixture
@@ -94,10 +80,11 @@ def test_what_is_found_is_read_back_as_the_same_machine(tmp_path, root, effect, 
     }
     shape = {n: v for n, v in shape.items() if n not in x}
     before = base.actuators
-    found = effect.edit(base, PLACES[effect.place_kind], x, shape)
+    place = PLACES[effect.place_kind]
+    found = effect.edit(base, place, x, shape)
     assert not same(found, base)
     assert base.actuators is before
-    edit = edit_of(effect, effect.physical(x, shape), channel)
+    edit = edit_of(effect.name, *place, unit=channel, **effect.physical(x, shape))
     path = written(tmp_path, file, edit)
     back = read_model_file(path)
     assert (back.edits, back.alternative, back.changed) == ((edit,), file.alternative, ())
@@ -113,7 +100,7 @@ def test_friction_of_a_joint_is_the_same_in_whatever_order_it_was_found(leg):
         "load_dependent_friction": {"share": 0.2},
         "viscous_friction": {"coefficient": 0.3},
     }
-    edits = [edit_of(EFFECTS[name], own) for name, own in values.items()]
+    edits = [edit_of(name, "rm_joint_2", **own) for name, own in values.items()]
     still, v = np.zeros((2, 1)), np.full((2, 1), 2.0)
     joint = ShaftSeries.at_joint(["rm_joint_2"], [0.0, 0.1], 0.1 * v, v, still, 2.5 * v)
     for order in itertools.permutations(edits):
@@ -127,9 +114,7 @@ def test_friction_of_a_joint_is_the_same_in_whatever_order_it_was_found(leg):
     ("velocity", "excess", "plausible"),
     [(0.1, 0.2, True), (0.09, 0.2, False), (0.1, 0.31, False), (0.6, 0.2, False)],
 )
-def test_a_break_away_beyond_the_reversal_is_stribeck_friction(
-    leg: ModelFile, velocity: float, excess: float, plausible: bool
-) -> None:
+def test_a_break_away_beyond_the_reversal_is_stribeck_friction(leg, velocity, excess, plausible):
     """Dry friction that has changed its sense to 95 %, erf(2 / sqrt 2), at .1 rad/s."""
     x, shape = {"coulomb": 0.1, "excess": excess}, {"velocity": velocity, "rise": 0.049}
     said = EFFECTS["stribeck_friction"].plausible(base_model(leg), ("rm_joint_2",), x, shape)
@@ -140,7 +125,8 @@ def test_a_break_away_beyond_the_reversal_is_stribeck_friction(
 def test_estimates_at_their_bounds_are_read_back(tmp_path, leg, end):
     """Whatever is plausible lies in the reader's bounds, the bounds themselves among it."""
     edits = [
-        edit_of(e, {p.name: float(getattr(p, end)) for p in e.parameters}) for e in EFFECTS.values()
+        edit_of(e.name, *PLACES[e.place_kind], **{p.name: getattr(p, end) for p in e.parameters})
+        for e in EFFECTS.values()
     ]
     assert list(read_model_file(written(tmp_path, leg, *edits)).edits) == edits
 
@@ -161,7 +147,7 @@ def test_estimates_at_their_bounds_are_read_back(tmp_path, leg, end):
     ],
 )
 def test_errors_are_one_clear_line(tmp_path, leg, old, new, said):
-    edit = edit_of(FRICTION, {"torque": 0.4})
+    edit = edit_of("coulomb_friction", "rm_joint_2", torque=0.4)
     text = (path := written(tmp_path, leg, edit)).read_text(encoding="utf-8")
     assert old in text
     if "interval" in new:
@@ -174,7 +160,7 @@ def test_errors_are_one_clear_line(tmp_path, leg, old, new, said):
 
 
 def test_what_may_be_left_out_is_and_changed_sources_are_told(tmp_path, leg):
-    edit = edit_of(EFFECTS["winding_heating"], {"rise": 3.0, "time_constant": 4.0})
+    edit = edit_of("winding_heating", "rm_joint_2", rise=3.0, time_constant=4.0)
     path = written(tmp_path, leg, edit)
     assert read_model_file(path).edits == (edit,)
     text = path.read_text(encoding="utf-8").replace(leg.named.sha256, "0" * 64)

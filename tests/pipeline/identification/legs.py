@@ -6,6 +6,8 @@ python -m tests.pipeline.identification.legs --out DIR [--only hexapod] [--hidde
 import argparse
 import re
 import time
+from functools import lru_cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -45,9 +47,9 @@ def robot_of(name: str) -> Robot:
     return load_robot(load_robot_file(Path("urdf") / f"{name}.toml"))
 
 
-def made(name: str, robot: Robot, hidden: str, motion: str, seed: int = 1) -> Walked:
+def made(name: str, hidden: str, motion: str) -> Walked:
     """A log with one thing hidden."""
-    kp, size, periods = ROBOTS[name]
+    robot, (kp, size, periods) = robot_of(name), ROBOTS[name]
     mass = sum(body.mass for body in robot.model.inertias)
     own: dict[str, Any] = {
         "nothing": {},
@@ -58,7 +60,7 @@ def made(name: str, robot: Robot, hidden: str, motion: str, seed: int = 1) -> Wa
         "coulomb": {"coulomb": dict.fromkeys(robot.joints[1::3], 2.0 * size)},
     }[hidden]
     walks = {"periods": periods} if motion == "walk" else {"squats": 24.0}
-    return walked(robot, **walks, **own, kp=kp, seed=seed, noise=0.15 * size)
+    return walked(robot, **walks, **own, kp=kp, noise=0.15 * size)
 
 
 def frame_of(robot: Robot, log: Walked, kind: str) -> pd.DataFrame:
@@ -117,39 +119,30 @@ def main() -> None:
 
     parser = argparse.ArgumentParser()
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--only", nargs="+", default=list(ROBOTS))
-    parser.add_argument("--hidden", nargs="+", default=list(HIDDEN))
-    parser.add_argument("--kinds", nargs="+", default=list(KINDS))
-    parser.add_argument("--motions", nargs="+", default=["walk", "stand"])
-    asked = parser.parse_args()
-    asked.out.mkdir(parents=True, exist_ok=True)
-    rows = []
-    for name in asked.only:
-        robot = robot_of(name)
-        for hidden in asked.hidden:
-            for motion in asked.motions:
-                walk = None
-                for kind in asked.kinds:
-                    path = asked.out / f"{name}_{hidden}_{motion}_{kind}.parquet"
-                    if not path.is_file():
-                        walk = walk or made(name, robot, hidden, motion)
-                        frame_of(robot, walk, kind).to_parquet(path)
-                    begun = time.process_time()
-                    try:
-                        found = gap(path, load(Path("urdf") / f"{name}.toml")).found
-                        verdict = judged(robot, hidden, found)
-                        names = (
-                            f"{r.effect} {r.place}, {r.level}: {r.reason}"
-                            for r in found.itertuples()
-                        )
-                        said = "; ".join(dict.fromkeys(names))
-                    except LegwattError as error:
-                        verdict, said = "refused", str(error)
-                    took = round(time.process_time() - begun, 1)
-                    rows.append((name, hidden, motion, kind, verdict, took, said[:600]))
-                    print(*rows[-1], sep=" | ", flush=True)
+    choices = {"only": ROBOTS, "hidden": HIDDEN, "motions": ("walk", "stand"), "kinds": KINDS}
+    for name, every in choices.items():
+        parser.add_argument(f"--{name}", nargs="+", default=[*every])
+    asked = vars(parser.parse_args())
+    out: Path = asked.pop("out")
+    out.mkdir(parents=True, exist_ok=True)
+    rows, walk = [], lru_cache(maxsize=1)(made)
+    for name, hidden, motion, kind in product(*(asked[key] for key in choices)):
+        robot, path = robot_of(name), out / f"{name}_{hidden}_{motion}_{kind}.parquet"
+        if not path.is_file():
+            frame_of(robot, walk(name, hidden, motion), kind).to_parquet(path)
+        begun = time.process_time()
+        try:
+            found = gap(path, load(Path("urdf") / f"{name}.toml")).found
+            verdict = judged(robot, hidden, found)
+            names = (f"{r.effect} {r.place}, {r.level}: {r.reason}" for r in found.itertuples())
+            said = "; ".join(dict.fromkeys(names))
+        except LegwattError as error:
+            verdict, said = "refused", str(error)
+        took = round(time.process_time() - begun, 1)
+        rows.append((name, hidden, motion, kind, verdict, took, said[:600]))
+        print(*rows[-1], sep=" | ", flush=True)
     columns = ["robot", "hidden", "motion", "kind", "verdict", "cpu_s", "said"]
-    pd.DataFrame(rows, columns=columns).to_csv(asked.out / "legs.csv", index=False)
+    pd.DataFrame(rows, columns=columns).to_csv(out / "legs.csv", index=False)
 
 
 if __name__ == "__main__":

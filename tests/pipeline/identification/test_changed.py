@@ -20,42 +20,33 @@ from pipeline.machine.machine import MachineModel, drivetrains_of
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.predict import Simulator
+from tests.command_line import edit_of
 from tests.pipeline.identification import bench_leg as leg
 
 TIBIA, SHARE = "rm_tibia_link", 0.02
-
-
-def edit(effect: str, place: str, values: dict[str, float]) -> Edit:
-    """As a first log would have shown it, known to two per cent."""
-    units = {p.name: p.unit for p in EFFECTS[effect].parameters}
-    rows = dict[str, dict[str, object]]()
-    for name, x in values.items():
-        ends = (x - SHARE * abs(x) - 1e-6, x + SHARE * abs(x) + 1e-6)
-        rows[name] = {"value": x, "unit": units[name], "interval": ends}
-    return Edit.model_validate({"effect": effect, "place": (place,), "parameters": rows})
 
 
 @pytest.fixture(scope="module")
 def first_day() -> tuple[MachineModel, tuple[Edit, ...]]:
     """A leg whose friction and shin a first log has shown."""
     bare = leg.leg_model()
-    friction = [edit("coulomb_friction", j, {"torque": 0.5}) for j in bare.joints]
-    friction += [edit("viscous_friction", j, {"coefficient": 0.5}) for j in bare.joints]
+    friction = [edit_of("coulomb_friction", j, within=SHARE, torque=0.5) for j in bare.joints]
+    friction += [edit_of("viscous_friction", j, within=SHARE, coefficient=0.5) for j in bare.joints]
     body = bare.rigid.inertias[bare.rigid.getJointId(bare.carrier(TIBIA))]
     names = [p.name for p in EFFECTS["rigid_body_parameters"].parameters]
     ten = dict(zip(names, body.toDynamicParameters().tolist(), strict=True))
-    edits = (*friction, edit("rigid_body_parameters", TIBIA, ten))
+    edits = (*friction, edit_of("rigid_body_parameters", TIBIA, within=SHARE, **ten))
     return apply_edits(bare, edits), edits
 
 
-def test_a_log_tells_how_well_bodies_and_friction_are_known(first_day):  # type: ignore[no-untyped-def]
+def test_a_log_tells_how_well_bodies_and_friction_are_known(first_day):
     known = first_day[0].known
     assert set(known) == {*first_day[0].joints, TIBIA}
     assert max(known[j] for j in first_day[0].joints) == pytest.approx(SHARE / 1.96, rel=1e-3)
     assert 0.2 * SHARE < known[TIBIA] < 2.0 * SHARE
 
 
-def test_what_is_mounted_and_friction_that_rose_are_told_as_that(first_day):  # type: ignore[no-untyped-def]
+def test_what_is_mounted_and_friction_that_rose_are_told_as_that(first_day):
     model, old = first_day
     place = {"mass": 0.4, "x": 0.0, "y": 0.0, "z": -0.1}
     truth = effect_named("link_mass").apply(model, (TIBIA,), place)
@@ -84,7 +75,7 @@ def test_a_gear_of_another_efficiency_than_assumed_is_told():
     assert first.values["factor"] == pytest.approx(0.2, abs=0.05)
 
 
-def test_nothing_has_changed_where_nothing_has(first_day):  # type: ignore[no-untyped-def]
+def test_nothing_has_changed_where_nothing_has(first_day):
     model, _ = first_day
     log = leg.measured(model, leg.leg_motion(3, 8.0), seed=7)
     assert identify(model, [log]).found == ()
@@ -112,7 +103,7 @@ def test_the_files_interval_is_the_tolerance():
 @pytest.mark.slow
 def test_load_friction_keeps_its_name_beside_an_unknown_torque_constant():
     stated = leg.leg_model()
-    constant = float(np.asarray(stated.actuator(J2).motor.torque_constant))  # type: ignore[union-attr]
+    constant = float(np.asarray(stated.actuator(J2).motor.torque_constant))
     truth = with_motor(stated, torque_constant=0.8 * constant)
     truth = effect_named("load_dependent_friction").apply(truth, (J2,), {"share": 0.12})
     log = leg.measured(truth, leg.leg_motion(duration=8.0))

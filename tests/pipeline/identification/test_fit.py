@@ -132,7 +132,7 @@ def test_a_body_is_worth_what_the_directions_of_a_base_agree_on(agree):
 def test_a_name_is_told_where_evidence_and_chunks_and_rest_and_interval_all_want_it(lacks):
     whole = Told(("coulomb_friction", J1), (0,), 0.1, 2.1, 0.011, certain=True, priced=True)
     assert whole.stands
-    assert not replace(whole, **lacks).stands  # type: ignore[arg-type]
+    assert not replace(whole, **lacks).stands
 
 
 @pytest.mark.parametrize(

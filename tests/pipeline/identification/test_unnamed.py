@@ -34,7 +34,7 @@ def model() -> MachineModel:
     return MachineModel(robot, drivetrains_of(Chain(""), robot.joints))
 
 
-def log_of(model: MachineModel, more=lambda m: 0.0) -> Log:  # type: ignore[no-untyped-def]
+def log_of(model: MachineModel, more=lambda m: 0.0) -> Log:
     """A torque log with a torque more at one joint."""
     m = leg.leg_motion()
     m = replace(m, channels=("torque",), effort=m.effort[..., :1], noise=np.full((3, 1), NOISE))
@@ -44,7 +44,7 @@ def log_of(model: MachineModel, more=lambda m: 0.0) -> Log:  # type: ignore[no-u
     return replace(m, effort=effort)
 
 
-def tables(model: MachineModel, log: Log):  # type: ignore[no-untyped-def]
+def tables(model: MachineModel, log: Log):
     return unnamed(model, make_data_sets([log]), log.noise, "log")
 
 
@@ -61,9 +61,7 @@ def test_a_clean_log_has_none(model):
         ("memory", lambda m, q: 0.5 * played(m.time, q, 0.1)),
     ],
 )
-def test_a_table_is_written_that_predicts_rows_without_a_say(  # type: ignore[no-untyped-def]
-    model, kind, law
-):
+def test_a_table_is_written_that_predicts_rows_without_a_say(model, kind, law):
     log = log_of(model, lambda m: law(m, m.q[:, model.index(JOINT)]))
     edits, rest = tables(model, log)
     rows = rest.set_index(["joint", "kind"])["share"]
@@ -76,9 +74,7 @@ def test_a_table_is_written_that_predicts_rows_without_a_say(  # type: ignore[no
 
 
 @pytest.mark.parametrize(("size", "told"), [(1.3, False), (3.0, True)])
-def test_what_stays_within_what_is_called_noise_has_no_table(  # type: ignore[no-untyped-def]
-    model, size, told
-):
+def test_what_stays_within_what_is_called_noise_has_no_table(model, size, told):
     wave = size * NOISE
     log = log_of(model, lambda m: wave * np.sin(4.0 * m.q[:, model.index(JOINT)]))
     assert bool(tables(model, log)[0]) == told
@@ -92,9 +88,7 @@ def test_what_stays_within_what_is_called_noise_has_no_table(  # type: ignore[no
         (lambda m, q: 0.0 * q, ""),
     ],
 )
-def test_what_a_model_leaves_anywhere_is_told_by_what_it_depends_on(  # type: ignore[no-untyped-def]
-    model, law, words
-):
+def test_what_a_model_leaves_anywhere_is_told_by_what_it_depends_on(model, law, words):
     log = log_of(model, lambda m: law(m, m.q[:, model.index(JOINT)]))
     left = {r.joint: r.description for r in leg.left_by(model, [log])}
     assert f"depends on the {words}" in left[JOINT] if words else left[JOINT] == ""

@@ -164,7 +164,7 @@ def test_no_torque_constant_and_resistance_on_a_fine_grid_do_better(published, f
     (*_, (_, _, stated)) = (row for row in frictions() if row[0] <= friction + 1e-6)
     k, r = np.meshgrid(np.linspace(30.1, 30.3, 201) * 1e-3, np.linspace(0.314, 0.318, 201))
     count = np.zeros(k.shape)
-    values = standing(k, r, friction * 1e-3, 0.04998)  # type: ignore[arg-type]
+    values = standing(k, r, friction * 1e-3, 0.04998)
     for name, value in values.items():
         row = published[name]
         count += np.abs(value - abs(row.value)) > row.half_width * (1 + 1e-9)

@@ -27,7 +27,7 @@ WALKERS = {
 
 
 def guessed(given: str, folder: Path, **options: object) -> tuple[Guess, Robot]:
-    guess = next(guesses(given, **options))  # type: ignore[arg-type]
+    guess = next(guesses(given, **options))
     path = folder / "robot.toml"
     path.write_text(robot_text(guess, path), encoding="utf-8")
     return guess, load_robot(load_robot_file(path))

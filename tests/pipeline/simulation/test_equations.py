@@ -116,7 +116,7 @@ def test_the_truth_leaves_noise_and_the_file_does_not(loaded, kind):
     e = equations_of(model, m)
     noise = float(np.sqrt(np.diagonal(e.noise, axis1=1, axis2=2)[:, e.joints][m.mask].mean()))
     left = [
-        float(np.sqrt(np.mean(Simulator(m).predict(one).rest[m.mask] ** 2)))  # type: ignore[index]
+        float(np.sqrt(np.mean(Simulator(m).predict(one).rest[m.mask] ** 2)))
         for one in (true, model)
     ]
     assert left[0] < noise  # forces that fit best take some of it

@@ -36,7 +36,7 @@ def machine(*friction: Friction, **changes: object) -> MachineModel:
     elements = (*friction, Ratio(name="gear", ratio=RATIO), Inertia(name="rotor", inertia=ROTOR))
     motor = DCMotor("winding", CONSTANT, RESISTANCE)
     model = read_machine(URDF).model
-    return model.with_actuator(Chain(JOINT, elements, motor, **changes))  # type: ignore[arg-type]
+    return model.with_actuator(Chain(JOINT, elements, motor, **changes))
 
 
 def driven(

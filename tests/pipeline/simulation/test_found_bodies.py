@@ -8,13 +8,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.effects.base import EFFECTS
 from pipeline.effects.bodies import physical
-from pipeline.effects.model_file import Edit, EditParameter, apply_edits, new_model_file
+from pipeline.effects.model_file import Edit, apply_edits, new_model_file
 from pipeline.machine.machine import MachineModel, strained
 from pipeline.robot.urdf import model_of_angles, read_urdf
 from pipeline.simulation.export import corrected_urdf, found_bodies
-from tests.command_line import base_model
+from tests.command_line import base_model, edit_of
 
 #: A link with a cover, a link whose mass is its tool's alone, and what must stay in the text.
 ARM = """<?xml version='1.0' encoding="UTF-8"?>
@@ -43,17 +42,8 @@ WHOLE = {"mass": 0.4, "mx": 0.01, "my": 0.02, "mz": 0.1, "Ixx": 0.06, "Iyy": 0.0
 WHOLE |= dict.fromkeys(("Ixy", "Ixz", "Iyz"), 0.0)
 
 
-def edit(effect: str, link: str, spread: float = 0.1, **values: float) -> Edit:
-    units = {p.name: p.unit for p in EFFECTS[effect].parameters}
-    ends = {n: (v - spread * abs(v), v + spread * abs(v)) for n, v in values.items()}
-    own = tuple(
-        EditParameter(name=n, value=v, unit=units[n], interval=ends[n]) for n, v in values.items()
-    )
-    return Edit(effect=effect, place=(link,), parameters=own, source="a test")
-
-
-def whole(link: str, spread: float = 0.1) -> Edit:
-    return edit("rigid_body_parameters", link, spread, **WHOLE)
+def whole(link: str, within: float = 0.1) -> Edit:
+    return edit_of("rigid_body_parameters", link, within=within, **WHOLE)
 
 
 @pytest.fixture
@@ -78,8 +68,8 @@ def torque_apart(text: str, machine: MachineModel) -> float:
 
 
 LEG = [
-    edit("link_mass", "rm_tibia_link", mass=0.5, x=0.1, z=-0.2),
-    edit("center_of_mass_offset", "rm_femur_link", x=0.01, y=0.0, z=-0.02),
+    edit_of("link_mass", "rm_tibia_link", mass=0.5, x=0.1, z=-0.2),
+    edit_of("center_of_mass_offset", "rm_femur_link", x=0.01, y=0.0, z=-0.02),
     whole("rm_hip_link"),
 ]
 
@@ -87,10 +77,10 @@ LEG = [
 @pytest.mark.parametrize(
     ("robot", "edits"),
     [
-        ("hexapod.toml", [edit("link_mass", "base_link", mass=2.0), whole("rm_tibia_link")]),
+        ("hexapod.toml", [edit_of("link_mass", "base_link", mass=2.0), whole("rm_tibia_link")]),
         ("leg.urdf", LEG),
-        ("arm", [whole("forearm"), edit("link_mass", "upper", mass=-0.2)]),
-        ("arm", [edit("link_mass", "forearm", mass=0.5, y=0.1)]),
+        ("arm", [whole("forearm"), edit_of("link_mass", "upper", mass=-0.2)]),
+        ("arm", [edit_of("link_mass", "forearm", mass=0.5, y=0.1)]),
     ],
 )
 def test_the_corrected_urdf_asks_for_the_same_torque(root, arm, robot, edits):
@@ -109,14 +99,17 @@ def test_the_corrected_urdf_asks_for_the_same_torque(root, arm, robot, edits):
 
 
 def test_intervals_decide_what_differs_and_come_first(arm):
-    bare, clear = base_model(new_model_file(arm)), edit("link_mass", "upper", 0.2, mass=0.5)
+    bare, clear = (
+        base_model(new_model_file(arm)),
+        edit_of("link_mass", "upper", within=0.2, mass=0.5),
+    )
     first, second = found_bodies(bare, [whole("forearm", 20.0), clear]).to_dict("records")
     assert (first["link"], first["differs_in"]) == ("upper", "mass")
     np.testing.assert_allclose([first["low_mass_kg"], first["high_mass_kg"]], [2.7, 2.9])
     assert first["found_center_z_m"] == pytest.approx(first["urdf_center_z_m"])
     assert second["differs_in"] == ""
     assert second["high_center_z_m"] is None or np.isnan(second["high_center_z_m"])
-    assert found_bodies(bare, [edit("coulomb_friction", "a", torque=0.1)]).empty
+    assert found_bodies(bare, [edit_of("coulomb_friction", "a", torque=0.1)]).empty
 
 
 #: A rod of 2 kg and 0.6 m along z, nearly without thickness.
