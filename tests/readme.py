@@ -10,7 +10,6 @@ import pandas as pd
 import pipeline as lw
 from pipeline.columns import about, every_table
 from pipeline.commands.main import main as command
-from pipeline.effects.base import COMPETING, EFFECTS
 from reports.figures.style import house_style
 from reports.run import drawings
 
@@ -66,40 +65,6 @@ def walking(out: Path) -> str:
     return markdown((*header, "cost of transport", "share of support"), lines)
 
 
-def effects(out: Path) -> str:
-    """Every effect with its parameters, from the catalogue."""
-    lines = []
-    for effect in EFFECTS.values():
-        units: dict[str, str] = {}
-        for p in effect.parameters:  # knots of a curve are told once
-            stem, _, knot = p.name.rpartition("_")
-            unit = (
-                p.unit.replace("*", "·")
-                .replace("^2", "²")
-                .replace("channel", "that of the channel")
-            )
-            units[f"{stem}_k" if knot.isdigit() else p.name] = unit
-        numbers = ", ".join(f"`{n}`" + (f" [{u}]" if u != "1" else "") for n, u in units.items())
-        lines.append((f"`{effect.name}`", effect.place_kind, numbers, effect.excitation))
-    return markdown(("effect", "acts at", "parameters", "is shown by a motion that"), lines, "---")
-
-
-def sizes(out: Path) -> str:
-    """The size in practice of every number in which an effect is fitted."""
-    forms = [form for e in EFFECTS.values() for form in (e, *COMPETING) if form.name == e.name]
-    numbers = {(form.name, c.name): c.size for form in forms for c in form.coordinates if c.size}
-    lines = [
-        [
-            f"`{effect}`",
-            f"`{name}`",
-            f"{size.value:g} of {size.of}".removesuffix(" of "),
-            size.reason,
-        ]
-        for (effect, name), size in numbers.items()
-    ]
-    return markdown(("effect", "number", "size", "reason"), lines, "---")
-
-
 def tables(out: Path) -> str:
     """Every table that a run may leave, from where its columns are declared."""
     lines = ((f"`{name}.csv`", about(name)) for name in every_table())
@@ -110,9 +75,7 @@ def tables(out: Path) -> str:
 BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "standing": ("README.md", standing),
     "walking": ("README.md", walking),
-    "effects": ("pipeline/effects/README.md", effects),
     "tables": ("reports/tables/README.md", tables),
-    "sizes": ("pipeline/effects/README.md", sizes),
 }
 
 

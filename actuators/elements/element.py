@@ -6,15 +6,14 @@
 With v the velocity, s = sgn(v) the sense of motion and T the torque on the joint side,
 
     friction = (coulomb + excess exp(-(v / stribeck_speed)^2)) s + skew |s|
-             + viscous v + asymmetry |v| + quadratic v |v| + saturating tanh(v / saturation_speed)
-             + (load + when_driving or when_driven) |T| s
+             + viscous v + quadratic v |v| + (load + when_driving or when_driven) |T| s
 
 is what the motor side supplies in addition: Coulomb, load-dependent and viscous (Eq. 4 to 6, 10,
 15, 17, 19 of the paper, dissipating for every sign); Stribeck (Armstrong-Helouvry, Dupont, Canudas
 de Wit, Automatica 30(7), 1994); by direction (`skew`, in motion a constant torque; Armstrong,
 "Control of machines with friction", 1991); by quadrant of power, s T > 0 where the motor drives
-(Hamon, Gautier, Garrec, IROS 2010); the rest by Bona and Indri's review, CDC 2005. After a reversal
-s may rise over a small displacement (`travel`, see `presliding`) or over a speed,
+(Hamon, Gautier, Garrec, IROS 2010); drag by Bona and Indri's review, CDC 2005. After a reversal s
+may rise over a small displacement (`travel`, see `presliding`) or over a speed,
 s = erf(v / (sqrt(2) rise)).
 """
 
@@ -171,11 +170,7 @@ class Friction(Element, law="friction"):
     excess: Scalars = number("torque")  #: Break-away less Coulomb friction [N*m].
     #: At which 1/e of the excess is left [rad/s].
     stribeck_speed: Scalars = number("angular velocity", "positive", 1.0)
-    #: By which viscous friction is larger forward and smaller backward [N*m*s/rad].
-    asymmetry: Scalars = number(rule="signed")
     quadratic: Scalars = 0.0  #: Per squared speed [N*m*s^2/rad^2].
-    saturating: Scalars = 0.0  #: Level of friction that grows less and less with speed [N*m].
-    saturation_speed: Scalars = number("", "positive", 1.0)  #: Over which it grows [rad/s].
     when_driving: Scalars = number("ratio")  #: Besides `load` while the motor drives the load.
     #: Besides `load` while the load drives the motor; together below 1.
     when_driven: Scalars = number("ratio")
@@ -188,9 +183,8 @@ class Friction(Element, law="friction"):
         super().__post_init__()
         together = np.less(np.add(self.load, self.when_driven), 1.0)
         require(together, self.name, "when_driven and load together must be below 1")
-        for part, whole in (("skew", "coulomb"), ("asymmetry", "viscous")):
-            within = np.less_equal(np.abs(getattr(self, part)), getattr(self, whole))
-            require(within, self.name, f"{part} must not exceed {whole}: it would give energy")
+        within = np.less_equal(np.abs(self.skew), self.coulomb)
+        require(within, self.name, "skew must not exceed coulomb: it would give energy")
 
     @property
     def of_load(self) -> bool:
@@ -219,10 +213,8 @@ class Friction(Element, law="friction"):
             torque = torque + self.skew * np.abs(sense)
         if np.any(self.excess):
             torque = torque + self.excess * np.exp(-((v / self.stribeck_speed) ** 2)) * sense
-        if np.any(self.asymmetry) or np.any(self.quadratic):
-            torque = torque + (self.asymmetry + self.quadratic * v) * np.abs(v)
-        if np.any(self.saturating):
-            torque = torque + self.saturating * np.tanh(v / self.saturation_speed)
+        if np.any(self.quadratic):
+            torque = torque + self.quadratic * v * np.abs(v)
         return torque + self.share(side.torque * sense > 0.0) * np.abs(side.torque) * sense
 
     def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:

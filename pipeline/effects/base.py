@@ -1,10 +1,15 @@
-"""What an effect is: a named edit of a machine, with places, parameters and coordinates."""
+"""What an effect is: a named edit of a machine, with places, parameters and coordinates.
+
+What it is called, its numbers and the motion that shows it stand in `effects.csv`.
+"""
 
 from __future__ import annotations
 
-from abc import ABC
+import csv
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from actuators.arrays import Array
@@ -42,7 +47,6 @@ class Size:
 
     value: float  #: In `of`, or in the number's unit where that is empty.
     of: str  #: What it is a share of, e.g. ``torque/speed``: root mean squares at the joint.
-    reason: str  #: Why, with the source.
 
     def at(self, scales: Values) -> float:
         """In the number's unit, with the scales of the joint and robot by name."""
@@ -73,31 +77,30 @@ class Form(NamedTuple):
     signed: bool = True  #: Whether negative coordinates make sense.
 
 
-#: A factor by how much more than once it is.
-MORE: Final = Form("more", lambda more: 1.0 + more, lambda factor: factor - 1.0)
+#: Forms by what `effects.csv` calls them: a factor by how much more than once it is, a torque
+#: constant's relative error by how much more current or, below nothing, back-EMF it asks for, a
+#: stiffness by its reciprocal.
+FORMS: Final = {
+    "more": Form("more", lambda more: 1.0 + more, lambda factor: factor - 1.0),
+    "constant": Form(
+        "more",
+        lambda more: 1.0 / (1.0 + more) - 1.0 if more > 0.0 else -more,
+        lambda relative: -relative / (1.0 + relative) if relative < 0.0 else -relative,
+    ),
+    "compliance": Form("compliance", lambda c: 1.0 / max(c, 1e-12), lambda k: 1.0 / k, False),
+}
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter of an effect; one with a step is a coordinate, or told by one."""
+    """One parameter of an effect, as results and model files have it."""
 
-    name: str  #: In the model file.
+    name: str
     unit: str  #: ``"channel"`` stands for the unit of the compared channel.
     low: float  #: Below this the effect makes no sense.
     high: float  #: Above this likewise.
-    size: Size | None = None  #: In practice; of the coordinate.
-    step: float = 0.0  #: Of the coordinate; 0 where there is none.
-    required: bool = True  #: As a coordinate.
-    optional: bool = False  #: Whether it may be left out and is zero then.
-    form: Form | None = None  #: Of the coordinate, where that is another number.
-
-    @property
-    def coordinate(self) -> Coordinate:
-        """The number in which it is fitted."""
-        name, signed = self.name, self.low < 0.0
-        if self.form:
-            name, signed = self.form.name, self.form.signed
-        return Coordinate(name, self.step, self.size, signed, self.required)
+    optional: bool  #: Whether it may be left out and is zero then.
+    form: Form | None  #: Of its coordinate, where that is another number.
 
 
 def place_text(place: Sequence[str]) -> str:
@@ -107,58 +110,62 @@ def place_text(place: Sequence[str]) -> str:
     return " with ".join(place) if place else "the whole machine"
 
 
-#: Every effect by name, in the order in which they were declared.
+#: Rows of `effects.csv` by their headers.
+Rows = Sequence[Mapping[str, str]]
+#: Every effect by name, in the order of `effects.csv`.
 EFFECTS: Final[dict[str, Effect]] = {}
 #: Those that are tried, each in the forms in which it competes; its places say for which machine.
 COMPETING: Final[list[Effect]] = []
+#: Classes of effects by the name that they have, or by the role that rows give them.
+CLASSES: Final[dict[str, list[type[Effect]]]] = {}
 
 
-class Effect(ABC):
-    """A kind of thing that a model may lack.
+class Effect:
+    """A kind of thing that a model may lack: rows of `effects.csv`, and what it does to a machine.
 
     An effect is fitted in `coordinates`, in which the prediction is linear or nearly so, at given
-    `shapes` (Stribeck speed, order of a ripple), and reported in `parameters`. A class with a name
-    enters the catalogue, `EFFECTS`; a subclass of the same name is that effect in another form.
+    `shapes` (Stribeck speed, order of a ripple), and reported in `parameters`. By itself it adds to
+    attributes of the joint's actuator and sensors; a class with its name says what it does else,
+    several with one name are forms of it.
     """
 
-    name: str  #: In the field's terms; key of the catalogue.
-    #: What it acts on: joint, joint pair, link, ground, effort channels or column.
-    place_kind: str = "joint"
-    parameters: tuple[Parameter, ...]  #: As written to results and model files.
-    #: As fitted; by default the parameters that have a step.
-    coordinates: tuple[Coordinate, ...]
-    #: Coordinates or parameters that add to attributes of the joint's actuator and sensors.
-    adds: tuple[tuple[str, str], ...] = ()
-    #: Whether it shows in what a motor takes, and not in a torque that is sensed at the joint.
-    electric: bool = False
-    excitation: str  #: The motion that shows it, in words.
-    #: Whether it replaces, or takes a share of, what stands at its place or acts on it.
-    replaces: bool = False
-    #: Whether it is tried by itself; others are fitted together for a whole machine.
-    competes: bool = True
-    #: Whether what it adds does not depend on what else acts at the joint.
-    additive: bool = False
+    name: str = ""  #: In the field's terms; key of the catalogue.
+    fits: tuple[str, ...] = ()  #: Coordinates of this form; all by default.
+    fixed: tuple[str, ...] = ()  #: Parameters that are known before the search.
     #: Lists of numbers that it has besides.
     tables: tuple[str, ...] = ()
-    #: Whether it changes what the files state: it is applied before what is added to them.
-    on_stated: bool = False
-    #: Whether it changes what stands between joint and motor, which is one drivetrain option's own.
-    of_drivetrain: bool = False
-    unseen: str = ""  #: Why standing and walking do not see it; empty where they do.
 
     def __init_subclass__(cls) -> None:
-        """Complete the coordinates; enter the catalogue."""
+        """Enter the classes."""
         super().__init_subclass__()
-        if "parameters" in vars(cls) and "coordinates" not in vars(cls):
-            cls.coordinates = tuple(p.coordinate for p in cls.parameters if p.step)
-        if hasattr(cls, "name"):
-            cls().enter()
+        CLASSES.setdefault(cls.name, []).append(cls)
 
-    def enter(self) -> None:
-        """Enter the catalogue."""
-        EFFECTS.setdefault(self.name, self)
-        if self.competes:
-            COMPETING.append(self)
+    def __init__(self, rows: Rows) -> None:
+        about, *numbers = rows
+        self.name, roles = about["effect"], about["role"].split()
+        #: Whether it is tried by itself; others are fitted together for a whole machine.
+        self.competes = "alone" not in roles
+        #: Whether what it adds does not depend on what else acts at the joint.
+        self.additive = "additive" in roles
+        #: Whether it shows in what a motor takes, and not in a torque that is sensed at the joint.
+        self.electric = "electric" in roles
+        #: Whether it replaces, or takes a share of, what stands at its place or acts on it.
+        self.replaces = "replaces" in roles
+        #: Whether it changes what the files state: it is applied before what is added to them.
+        self.on_stated = "on_stated" in roles
+        #: Whether it changes what stands between joint and motor, one drivetrain option's own.
+        self.of_drivetrain = "of_drivetrain" in roles
+        #: What it acts on: joint, joint pair, link, ground, effort channels or column.
+        self.place_kind = about["of"]
+        self.excitation = about["words"]  #: The motion that shows it, in words.
+        #: Why standing and walking do not see it; empty where they do.
+        self.unseen = about["unseen"]
+        #: As written to results and model files.
+        self.parameters = tuple(_parameter(row) for row in numbers if row["unit"])
+        every = {c.name: c for c in (_coordinate(row) for row in numbers if row["step"])}
+        self.coordinates = tuple(every[name] for name in self.fits or every)  #: As fitted.
+        #: Numbers, as fitted where they are, to the attribute or term of a law that they are.
+        self.acts = {_fitted_name(row): row["acts"] for row in numbers if row["acts"]}
 
     def places(self, model: MachineModel, m: Measured) -> list[Place]:
         """Where in this machine and log the effect could be; one place has its kind's name."""
@@ -178,7 +185,7 @@ class Effect(ABC):
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """The machine with the effect at coordinates `x` and shape `shape`."""
         joint = model.actuator(place[0])
-        more = {of: getattr(joint, of) + x[name] for name, of in self.adds}
+        more = {of: getattr(joint, of) + x[name] for name, of in self.acts.items()}
         return self.at_joint(model, place, **more, **shape)
 
     @staticmethod
@@ -251,6 +258,35 @@ def observable(model: MachineModel, m: Measured, joint: str) -> bool:
     """Whether a log depends on the body at a joint: of a base on measured feet only torques do."""
     base = model.robot.floating and model.rigid.getJointId(joint) == 1
     return not (base and m.feet) or m.channels == ("torque",)
+
+
+def _fitted_name(row: Mapping[str, str]) -> str:
+    return FORMS[row["told_by"]].name if row["told_by"] else row["number"]
+
+
+def _parameter(row: Mapping[str, str]) -> Parameter:
+    low, high = (float(row[end]) for end in ("low", "high"))
+    optional, form = "optional" in row["role"], FORMS.get(row["told_by"])
+    return Parameter(row["number"], row["unit"], low, high, optional, form)
+
+
+def _coordinate(row: Mapping[str, str]) -> Coordinate:
+    form = FORMS.get(row["told_by"])
+    signed = form.signed if form else not row["unit"] or float(row["low"]) < 0.0
+    size = Size(float(row["size"]), row["of"])
+    step, required = float(row["step"]), "spare" not in row["role"]
+    return Coordinate(_fitted_name(row), step, size, signed, required)
+
+
+def enter() -> None:
+    """Enter the effects of `effects.csv`, each in the classes that have its name or its role."""
+    with Path(__file__).with_name("effects.csv").open(encoding="utf-8", newline="") as file:
+        for name, group in groupby(csv.DictReader(file), lambda row: row["effect"]):
+            rows = [*group]
+            roles = [role for role in rows[0]["role"].split() if role in CLASSES]
+            forms = [of(rows) for of in CLASSES.get(roles[0] if roles else name, [Effect])]
+            EFFECTS[name] = forms[0]
+            COMPETING.extend(form for form in forms if form.competes)
 
 
 def effect_named(name: str) -> Effect:

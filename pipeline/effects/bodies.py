@@ -8,21 +8,16 @@ import pinocchio as pin
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.effects.base import Effect, Parameter, Place, Size, Values
+from pipeline.effects.base import Effect, Place, Values
 from pipeline.machine.machine import MachineModel
 
 #: In the order of `pin.Inertia.toDynamicParameters`: about the origin of the joint's frame.
 NAMES: Final = ("mass", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
-UNITS: Final = ("kg", *("kg*m",) * 3, *("kg*m^2",) * 6)
 #: Where a payload is in the frame of its link's joint.
 AXES: Final = ("x", "y", "z")
 FARTHEST: Final = 10.0  # [m]
 #: Ten inertial parameters of a unit rotational inertia that is the same about all axes.
 ALIKE: Final = np.isin(NAMES, ("Ixx", "Iyy", "Izz")).astype(float)
-_PAYLOAD: Final = Size(0.1, "mass", "payloads are a tenth of a robot's mass (data sheets)")
-_EXTENT: Final = Size(2.5e-4, "mass", "its radius of gyration is some centimetres")
-_SHIFT: Final = Size(0.05, "", "cables, covers and grippers shift it by centimetres")
-_LEVEL: Final = Size(0.05, "", "mountings and floors are level to a few degrees")
 
 
 class RigidBodyParameters(Effect):
@@ -32,13 +27,6 @@ class RigidBodyParameters(Effect):
     """
 
     name = "rigid_body_parameters"
-    place_kind = "link"
-    parameters = tuple(
-        Parameter(n, u, 0.0 if n in ("mass", "Ixx", "Iyy", "Izz") else -1e6, 1e6)
-        for n, u in zip(NAMES, UNITS, strict=True)
-    )
-    competes = False
-    excitation = "moves all joints at once, fast and slowly, through all their travel"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Put them in the place of the file's.
@@ -83,14 +71,6 @@ class LinkMass(Effect):
     """
 
     name = "link_mass"
-    additive = True
-    place_kind = "link"
-    parameters = (
-        Parameter("mass", "kg", -1e4, 1e4, _PAYLOAD, step=1e-2),
-        Parameter("inertia", "kg*m^2", 0.0, 1e4, _EXTENT, step=1e-4, required=False, optional=True),
-        *(Parameter(axis, "m", -FARTHEST, FARTHEST, optional=True) for axis in AXES),
-    )
-    excitation = "holds and moves the link in clearly different postures"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Add the mass."""
@@ -135,12 +115,6 @@ class CenterOfMassOffset(Effect):
     """Displacement of a link's centre of mass in the frame of its joint."""
 
     name = "center_of_mass_offset"
-    additive = True
-    place_kind = "link"
-    parameters = tuple(
-        Parameter(axis, "m", -0.5, 0.5, _SHIFT, step=1e-3, required=False) for axis in AXES
-    )
-    excitation = "holds the link in postures all around its axis"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Displace it."""
@@ -154,13 +128,6 @@ class BaseTilt(Effect):
     """Ground, or a stand, that is not level: gravity does not point along its normal."""
 
     name = "base_tilt"
-    additive = True
-    place_kind = "ground"
-    parameters = tuple(
-        Parameter(axis, "rad", -0.6, 0.6, _LEVEL, step=1e-3, required=False)
-        for axis in ("roll", "pitch")
-    )
-    excitation = "holds links outstretched in several directions"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Tilt it further."""

@@ -1,30 +1,21 @@
 """Effects between joint and motor: friction, elasticity, backlash, inertia, coupled joints.
 
-Laws of friction are rows of one table over the one law, `elements.element.Friction`.
+Laws of friction are rows of `effects.csv` over the one law, `elements.element.Friction`. Elasticity
+is a spring between motor and joint, one of which turns ahead of the other by torque / stiffness
+(Spong, J. Dyn. Sys. Meas. Control 109, 1987): with the encoder at the joint the motor's speed and
+acceleration follow, with the encoder at the motor the joint's do.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from actuators.elements.element import Element, Friction, Inertia
 from actuators.elements.heating import Warming
 from actuators.errors import LegwattError
-from pipeline.effects.base import (
-    EVERY,
-    MORE,
-    Coordinate,
-    Effect,
-    Form,
-    Measured,
-    Parameter,
-    Place,
-    Shapes,
-    Size,
-    Values,
-)
+from pipeline.effects.base import EVERY, Effect, Measured, Place, Shapes, Values
 from pipeline.machine.machine import MachineModel
 
 _STRIBECK_SPEEDS: Final = (0.012, 0.025, 0.05, 0.1, 0.2, 0.4)  # [rad/s]
@@ -33,71 +24,26 @@ _LARGEST_STRIBECK_SPEED: Final = 0.5  # [rad/s]
 #: known than its width: at 2 dry friction has 95 % of its level.
 _REVERSED: Final = 2.0
 _LARGEST_EXCESS: Final = 3.0  # of break-away over Coulomb friction, in Coulomb friction
-_ALL: Final = "friction takes 5 to 100 % of a geared joint's torque (arms and servos measured)"
-DRY: Final = Size(1.0, "torque", _ALL)
-VISCOUS: Final = Size(1.0, "torque/speed", _ALL)
-_BREAK: Final = "break-away is up to half above (Armstrong et al., Automatica 30, 1994)"
-_GEAR: Final = Size(0.1, "", "gears lose 5 to 30 % of the load (efficiencies in data sheets)")
-_WARM: Final = "1 to 2 % per kelvin (Bittencourt, J. Dyn. Sys. Meas. Control 134, 2012)"
-_THINNER: Final = Size(0.02, "torque/speed", _WARM)
 #: Terms of the law that are forces, and those that are shares of the load.
 _SHARES: Final = ("load", "when_driving", "when_driven")
-_LEVELS: Final = (
-    *("coulomb", "viscous", "skew", "excess", "asymmetry", "quadratic", "saturating"),
-    *_SHARES,
-)
-#: The terms of the law, in the order in which model files have them.
-_BY_TERM: Final = (
-    Parameter("coulomb", "N*m", 0.0, 1e3, DRY, step=1e-2),
-    Parameter("viscous", "N*m*s/rad", 0.0, 1e3, VISCOUS, step=1e-2),
-    Parameter("excess", "N*m", 0.0, 1e3, Size(0.5, "torque", _BREAK), step=1e-2),
-    Parameter("stribeck_speed", "rad/s", 1e-6, 1e4),
-    Parameter("quadratic", "N*m*s^2/rad^2", 0.0, 1e3, Size(1.0, "torque/speed^2", _ALL), step=1e-2),
-    Parameter("load", "1", 0.0, 0.99, _GEAR, step=1e-3),
-    Parameter("driving", "1", 0.0, 10.0, _GEAR, step=1e-3),
-    Parameter("driven", "1", 0.0, 0.99, _GEAR, step=1e-3),
-    Parameter("rise", "rad/s", 0.0, 1e4, optional=True),
-    Parameter("travel", "rad", 0.0, 1.0, optional=True),
-)
-TERMS: Final = {p.name: p for p in _BY_TERM}
-_CALLED: Final = {"driving": "when_driving", "driven": "when_driven"}
+_LEVELS: Final = ("coulomb", "viscous", "skew", "excess", "quadratic", *_SHARES)
 #: How dry friction changes its sense at a reversal: of the joint, whatever the law.
 REVERSAL: Final = ("rise", "travel")
 
 
-class FrictionPreset(Effect):
+class FrictionLaw(Effect):
     """Friction inserted at the joint's shaft: some terms of the law.
 
-    Dry friction may come with how it changes its sense at a reversal, `REVERSAL`.
-
-    Each parameter has a term, of `TERMS`; `velocity` is a Stribeck speed, and without the optional
-    ones it is the effect still.
+    Dry friction may come with how it changes its sense at a reversal, `REVERSAL`. `velocity` is a
+    Stribeck speed.
     """
 
+    name = "friction"
     fixed = REVERSAL  #: Known before the search: see `pipeline.identification.offered.reversals`.
-    of_drivetrain = True
-
-    def __init__(
-        self,
-        name: str,
-        terms: Mapping[str, str],
-        excitation: str,
-        optional: Sequence[str] = (),
-        **about: Any,
-    ) -> None:
-        dry = {} if set(terms.values()) <= {"viscous", "quadratic"} else {t: t for t in REVERSAL}
-        self.name, self.excitation, self.terms = name, excitation, {**terms, **dry}
-        self.parameters = tuple(
-            replace(TERMS[term], name=own, required=own not in optional)
-            for own, term in self.terms.items()
-        )
-        self.coordinates = tuple(p.coordinate for p in self.parameters if p.step)
-        self.replaces = any(_CALLED.get(t, t) in _SHARES for t in terms.values())
-        vars(self).update(about)
 
     def shapes(self, model: MachineModel, m: Measured, place: Place) -> Shapes:
         """Stribeck speeds above where friction changes sign and below the fastest motion."""
-        if "velocity" not in self.terms:
+        if "velocity" not in self.acts:
             return [{}]
         k = model.index(place[0])
         slowest, fastest = 1.5 * float(m.rest_speed[k]), 0.6 * float(m.fast[k])
@@ -117,37 +63,9 @@ class FrictionPreset(Effect):
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert it."""
-        terms = {self.terms[name]: value for name, value in {**x, **shape}.items()}
-        law = Friction(self.name, **{_CALLED.get(t, t): value for t, value in terms.items()})
+        terms = {self.acts[name]: value for name, value in {**x, **shape}.items()}
+        law = Friction(self.name, **terms)
         return model.with_actuator(model.actuator(place[0]).with_element(law))
-
-
-_BOTH: Final = "moves in both directions at several speeds"
-_FAST: Final = "moves at clearly different speeds, the fastest near the limit"
-for _row in (
-    FrictionPreset("coulomb_friction", {"torque": "coulomb"}, _BOTH, additive=True),
-    FrictionPreset("viscous_friction", {"coefficient": "viscous"}, _FAST, additive=True),
-    FrictionPreset("quadratic_drag", {"quadratic": "quadratic"}, _FAST, additive=True),
-    FrictionPreset(
-        "stribeck_friction",
-        {"coulomb": "coulomb", "excess": "excess", "velocity": "stribeck_speed"},
-        "passes slowly through many speeds below the Stribeck speed",
-        optional=["coulomb"],
-        additive=True,
-    ),
-    FrictionPreset(
-        "load_dependent_friction",
-        {"share": "load"},
-        "moves at one speed under clearly different loads, both ways",
-    ),
-    FrictionPreset(  # with a coefficient for each power quadrant
-        "backdrive_loss",
-        {"driving": "driving", "driven": "driven"},
-        "raises and lowers clearly different loads",
-        optional=["driving", "driven"],
-    ),
-):
-    _row.enter()
 
 
 class DirectionDependentFriction(Effect):
@@ -158,26 +76,13 @@ class DirectionDependentFriction(Effect):
     """
 
     name = "direction_dependent_friction"
-    additive = True
-    parameters = (
-        Parameter("positive", "N*m", 0.0, 1e3, DRY, step=1e-2),
-        Parameter("negative", "N*m", 0.0, 1e3, DRY, step=1e-2),
-        TERMS["rise"],
-        TERMS["travel"],
-    )
-    excitation = "moves in both directions, with stops in between"
     fixed = REVERSAL
-    of_drivetrain = True
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert friction at the joint's shaft."""
         mean, half = 0.5 * (x["positive"] + x["negative"]), 0.5 * (x["positive"] - x["negative"])
         law = Friction(name=self.name, coulomb=mean, skew=half, **shape)
         return model.with_actuator(model.actuator(place[0]).with_element(law))
-
-
-def _factor(size: float, reason: str) -> Parameter:
-    return Parameter("factor", "1", 0.0, 100.0, Size(size, "", reason), step=1e-3, form=MORE)
 
 
 class FrictionFactor(Effect):
@@ -187,13 +92,6 @@ class FrictionFactor(Effect):
     """
 
     name = "friction_factor"
-    replaces = True
-    parameters = (
-        _factor(0.1, "temperature and load change friction by tenths (Bittencourt, 2012)"),
-    )
-    on_stated = True
-    of_drivetrain = True
-    excitation = "moves both ways at clearly different speeds and loads"
     terms: tuple[str, ...] = _LEVELS  #: Of the law that are multiplied.
 
     def places(self, model: MachineModel, m: Measured) -> list[Place]:
@@ -221,8 +119,6 @@ class GearLossFactor(FrictionFactor):
     """Friction by the load that the files state, times a factor: a gear of another efficiency."""
 
     name = "gear_loss_factor"
-    parameters = (_factor(0.5, "efficiencies that sheets leave out are assumed by class"),)
-    excitation = "moves at one speed under clearly different loads, both ways"
     terms = _SHARES
 
 
@@ -241,15 +137,6 @@ class WarmingFriction(Effect):
     """Dry and viscous friction that a joint loses per kelvin; a log with temperatures shows it."""
 
     name = "warming_friction"
-    replaces = True
-    parameters = (
-        Parameter("coulomb", "N*m/K", 0.0, 1e2, Size(0.02, "torque", _WARM), 1e-3, required=False),
-        Parameter("viscous", "N*m*s/(rad*K)", 0.0, 1e2, _THINNER, 1e-3, required=False),
-        Parameter("reference", "K", 100.0, 1000.0),
-    )
-    excitation = "repeats its first motion, both ways at several speeds, once the gears are warm"
-    unseen = "friction is that of the temperature which its file states"
-    additive = True
 
     def places(self, model: MachineModel, m: Measured) -> list[Place]:
         """Joints whose temperature is measured."""
@@ -270,28 +157,6 @@ COMPLIANCE_TOLERANCE: Final = 1.2e-5
 _SEATED: Final = (0.02, 0.1, 0.3, 1.0)  # of the joint's torque, at which a flank may be seated
 _FULL: Final = 1.0  # a joint carried along by a bevel or a cable turns one to one
 _LEAST_RATIO: Final = 0.1  # below it the shaft is the own joint's
-_SOFT: Final = Size(1e-4, "", "harmonic drives have 1e4 N·m/rad (data sheets), belts less")
-_PLAY: Final = Size(5e-3, "", "precision gears: an arc minute; hobby servos: half a degree")
-_BENDING: Final = Form("compliance", lambda c: 1.0 / max(c, 1e-12), lambda k: 1.0 / k, False)
-_STIFFNESS: Final = Parameter("stiffness", "N*m/rad", 1.0, 1e12, _SOFT, 1e-6, form=_BENDING)
-_ROTOR: Final = Size(
-    1.0, "torque/acceleration", "behind a high ratio a rotor takes all of a torque"
-)
-_CARRIED: Final = Size(1.0, "", "a joint carried along by a bevel or a cable turns one to one")
-
-
-class JointElasticity(Effect):
-    """A spring between motor and joint: one turns ahead of the other by torque / stiffness.
-
-    Spong, J. Dyn. Sys. Meas. Control 109, 1987. With the encoder at the joint the motor's speed
-    and acceleration follow; with the encoder at the motor the joint's do.
-    """
-
-    name = "joint_elasticity"
-    parameters = (_STIFFNESS,)
-    excitation = "changes its torque fast: accelerates, brakes and steps hard"
-    adds = (("compliance", "compliance"),)
-    unseen = "the motor's own motion differs by the wind-up only"
 
 
 class Backlash(Effect):
@@ -305,14 +170,6 @@ class Backlash(Effect):
     """
 
     name = "backlash"
-    parameters = (
-        Parameter("width", "rad", 0.0, 1.0, _PLAY, step=1e-5),
-        replace(_STIFFNESS, required=False),
-        Parameter("crossing", "N*m", 0.0, 1e4),
-    )
-    excitation = "lets the torque change its sign often, slowly and fast"
-    adds = (("width", "backlash"), ("compliance", "compliance"))
-    unseen = "the motor's own motion differs by the gap only"
 
     def shapes(self, model: MachineModel, m: Measured, place: Place) -> Shapes:
         """Crossing torques, as shares of what the joint's actuator gives on the whole."""
@@ -330,10 +187,6 @@ class RotorInertia(Effect):
     """Inertia beyond the data sheet at the motor's shaft, which without a gear is the joint's."""
 
     name = "rotor_inertia"
-    additive = True
-    parameters = (Parameter("added", "kg*m^2", 0.0, 1e3, _ROTOR, step=1e-7),)
-    excitation = "accelerates hard on an axis whose load does not change"
-    of_drivetrain = True
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert it at the motor."""
@@ -349,18 +202,7 @@ class TransmissionCoupling(Effect):
     """
 
     name = "transmission_coupling"
-    replaces = True
-    place_kind = "joint pair"
-    parameters = (
-        Parameter("ratio", "1", -5.0, 5.0, _CARRIED, step=1e-3),
-        Parameter("inertia", "kg*m^2", 0.0, 1e3, optional=True),
-        Parameter("viscous", "N*m*s/rad", 0.0, 1e3, optional=True),
-        Parameter("coulomb", "N*m", 0.0, 1e3, optional=True),
-        Parameter("rise", "rad/s", 0.0, 1e4, optional=True),
-        Parameter("travel", "rad", 0.0, 1.0, optional=True),
-    )
-    excitation = "moves one joint of the pair while the other stands still, then the other way"
-    of_drivetrain = True
+    fits: tuple[str, ...] = ("ratio",)
     driven = True  #: Whether it is that of joints with a motor in the model.
 
     def places(self, model: MachineModel, m: Measured) -> list[Place]:
@@ -408,11 +250,7 @@ class TransmissionCoupling(Effect):
 class BareCoupling(TransmissionCoupling):
     """The coupling of a machine whose model has no actuator yet: the shaft comes with it."""
 
-    coordinates = (
-        Coordinate("inertia", 1e-3, _ROTOR, required=False),
-        Coordinate("viscous", 1e-2, VISCOUS, required=False),
-        Coordinate("coulomb", 1e-2, DRY, required=False),
-    )
+    fits = ("inertia", "viscous", "coulomb")
     driven = False
 
     def shapes(self, model: MachineModel, m: Measured, place: Place) -> Shapes:

@@ -13,41 +13,20 @@ from actuators.errors import LegwattError
 from pipeline.effects.base import (
     CHANNEL_UNITS,
     EVERY,
-    MORE,
-    Coordinate,
     Effect,
-    Form,
     Measured,
-    Parameter,
     Place,
     Shapes,
-    Size,
     Values,
 )
 from pipeline.machine.machine import MachineModel
 
 CONSTANT_TOLERANCE: Final = 0.02  # one standard deviation [1]
 _TIMES: Final = (1.5, 4.0, 10.0, 30.0)  # [s]
-#: Above or below what the data sheet's values hold for [K]; insulation gives way.
-_HOTTEST: Final = 150.0
 _LEAST_ORDER: Final = 4.0  # periods per turn; below it is a spring rather than a ripple
 _PERIODS: Final = 1.5  # least number of periods inside the travel
 _SOFTEST: Final = 1e-9  # [N*m/rad]
 _FURTHEST_REST: Final = 4.0 * np.pi  # [rad]
-_CONSTANT: Final = Size(0.1, "", "data sheets state torque constants to 10 %")
-_THERMAL: Final = Size(5.0, "", "1 to 10 K/W in data sheets of motors below 200 W")
-_HOUSING: Final = Size(3.0, "", "windings warm a few times as much as their housing")
-_WARM: Final = Size(30.0, "", "from a cold room to a warm winding")
-_COGGING: Final = Size(0.1, "torque", "cogging and errors of teeth are some per cent of a torque")
-_ALL: Final = "a spring may carry all of a joint's load"
-
-
-#: How much more current or, below nothing, back-EMF, of a torque constant's relative error.
-_TURNS: Final = Form(
-    "more",
-    lambda more: 1.0 / (1.0 + more) - 1.0 if more > 0.0 else -more,
-    lambda relative: -relative / (1.0 + relative) if relative < 0.0 else -relative,
-)
 
 
 class TorqueConstantError(Effect):
@@ -59,10 +38,6 @@ class TorqueConstantError(Effect):
     """
 
     name = "torque_constant_error"
-    parameters = (Parameter("relative", "1", -0.99, 99.0, _CONSTANT, 1e-3, form=_TURNS),)
-    replaces = True
-    electric = True
-    excitation = "carries clearly different known loads"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Scale it."""
@@ -78,16 +53,7 @@ class WindingHeating(Effect):
     """Windings that warm up: one thermal node per motor, warmed by R I^2 and what surrounds it."""
 
     name = "winding_heating"
-    replaces = True
-    parameters = (
-        Parameter("rise", "K", -_HOTTEST, _HOTTEST, _WARM, 1.0, required=False, optional=True),
-        Parameter("thermal_resistance", "K/W", 0.0, 1e3, _THERMAL, 0.5, False, optional=True),
-        Parameter("time_constant", "s", 0.01, 1e5),
-        Parameter("sensor_gain", "1", 0.0, 30.0, optional=True),
-    )
-    excitation = "works hard for several thermal time constants, then repeats its first motion"
-    unseen = "one cycle is too short to warm a winding; numbers are for cold motors"
-    electric = True
+    fits = ("rise", "thermal_resistance")
     sensed = False  #: Whether the motors' temperature is measured where it competes.
 
     def places(self, model: MachineModel, m: Measured) -> list[Place]:
@@ -109,10 +75,7 @@ class WindingHeating(Effect):
 class SensedHeating(WindingHeating):
     """The same where a sensor on the motor's housing is read: it shows what warmed it before."""
 
-    coordinates = (
-        Coordinate("sensor_gain", 0.1, _HOUSING, required=False),
-        Coordinate("thermal_resistance", 0.5, _THERMAL, required=False),
-    )
+    fits = ("sensor_gain", "thermal_resistance")
     sensed = True
 
 
@@ -124,16 +87,6 @@ class TorqueRipple(Effect):
     """
 
     name = "torque_ripple"
-    additive = True
-    parameters = (
-        Parameter("amplitude", "N*m", 0.0, 1e3),
-        Parameter("order", "1", 0.0, 1e6),
-        Parameter("phase", "rad", -10.0, 10.0),
-    )
-    coordinates = tuple(
-        Coordinate(name, 1e-2, _COGGING, signed=True, required=False) for name in ("sine", "cosine")
-    )
-    excitation = "turns slowly and evenly through the whole travel"
 
     def orders(self, m: Measured, joint: int) -> Array:
         """Orders that this motion can show, so dense that none lies between two."""
@@ -173,13 +126,6 @@ class ParallelSpring(Effect):
     """A spring from one link to the next: torque in proportion to the distance from its rest."""
 
     name = "parallel_spring"
-    additive = True
-    parameters = (Parameter("stiffness", "N*m/rad", -1e4, 1e4), Parameter("rest", "rad", -1e3, 1e3))
-    coordinates = (
-        Coordinate("stiffness", 1e-2, Size(1.0, "torque/travel", _ALL), signed=True),
-        Coordinate("preload", 1e-2, Size(1.0, "torque", _ALL), signed=True, required=False),
-    )
-    excitation = "holds many positions over the whole travel, in several postures of the others"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Add it at the joint; the preload is its torque at position zero."""
@@ -209,11 +155,7 @@ class UnnamedTorque(Effect):
     """
 
     name = "unnamed_torque"
-    parameters = ()
     tables = ("angle", "level", "friction", "speed", "drag", "radius", "memory")
-    competes = False
-    excitation = "moves both ways at many speeds and angles"
-    of_drivetrain = True
 
     def apply(self, model: MachineModel, place: Place, values: Mapping[str, Any]) -> MachineModel:
         """The machine with the table at the joint's own side.
@@ -232,32 +174,6 @@ _COLUMNS: Final = {f"{name}_{unit.replace('*', '')}": name for name, unit in CHA
 ENCODER_TOLERANCE: Final = 2.5e-3  # one standard deviation [rad]
 #: Skew between channels that sampling leaves, one standard deviation [s].
 SKEW_TOLERANCE: Final = 3e-4
-_ZERO: Final = Size(9e-3, "", "half a degree is usual after calibration")
-_OFFSET: Final = Size(0.1, "effort", "zeros of torque and current sensors drift by a few per cent")
-_GAIN: Final = Size(0.03, "", "calibrated sensors: a few per cent; what is more is a unit's factor")
-_SENSOR: Final = "it acts on a sensor"
-_LATE: Final = Size(1.0, "sample", "sampling and buses delay by about one period")
-
-
-class PositionOffset(Effect):
-    """A constant added by the position sensor: an encoder whose zero is off."""
-
-    name = "position_offset"
-    parameters = (Parameter("angle", "rad", -1.6, 1.6, _ZERO, step=1e-3),)
-    excitation = "holds the link in postures all around its axis"
-    unseen = _SENSOR
-    adds = (("angle", "encoder_offset"),)
-
-
-class EffortOffset(Effect):
-    """A constant added by the sensor of torque, current or voltage."""
-
-    name = "effort_offset"
-    additive = True
-    parameters = (Parameter("offset", "channel", -1e4, 1e4, _OFFSET, step=1e-3),)
-    excitation = "stands still without load, then moves both ways"
-    unseen = _SENSOR
-    adds = (("offset", "effort_offset"),)
 
 
 class EffortGain(Effect):
@@ -272,11 +188,6 @@ class EffortGain(Effect):
     """
 
     name = "effort_gain"
-    place_kind = "effort column"
-    parameters = (Parameter("gain", "1", 0.01, 100.0, _GAIN, step=1e-3, form=MORE),)
-    replaces = True
-    excitation = "carries clearly different known loads"
-    unseen = _SENSOR
 
     def places(self, model: MachineModel, m: Measured) -> list[Place]:
         """All columns of a channel together, then each of its own."""
@@ -308,12 +219,6 @@ class TimeDelay(Effect):
     """One delay between position and effort, of all joints alike or of one joint."""
 
     name = "time_delay"
-    place_kind = "effort channels"
-    #: A servo whose torque comes later than this does not hold a leg; logs are aligned better.
-    parameters = (Parameter("delay", "s", -0.06, 0.06, _LATE, step=2e-4),)
-    adds = (("delay", "delay"),)
-    excitation = "changes its torque fast: accelerates, brakes and reverses"
-    unseen = _SENSOR
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Delay them further, or one joint's alone."""

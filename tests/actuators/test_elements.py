@@ -31,7 +31,7 @@ from tests.actuators.motions import (
 torques = st.floats(-1e3, 1e3)
 speeds = st.floats(-1e3, 1e3).filter(lambda v: abs(v) > 1e-6)
 positive, fraction = st.floats(0.0, 10.0), st.floats(0.0, 0.47)
-FRICTION = {name: positive for name in ("coulomb", "excess", "quadratic", "saturating", "viscous")}
+FRICTION = {name: positive for name in ("coulomb", "excess", "quadratic", "viscous")}
 FRICTION |= dict.fromkeys(("load", "when_driving", "when_driven"), fraction)
 
 
@@ -43,7 +43,7 @@ def hypoids(draw):
     return Hypoid("h", draw(st.floats(1, 100)), b1, b2, 0.03, draw(st.floats(0, most)))
 
 
-SIDED = Friction("f", coulomb=2.0, skew=-1.5, viscous=0.3, asymmetry=0.2, stribeck_speed=0.2)
+SIDED = Friction("f", coulomb=2.0, skew=-1.5, viscous=0.3, stribeck_speed=0.2)
 FRICTIONS = st.builds(Friction, st.just("f"), **FRICTION) | st.just(SIDED)
 ELEMENTS = (
     FRICTIONS
@@ -88,8 +88,6 @@ E = math.e
         (SKEW, [1.0, -1.0], 0.0, [2.0, -0.5]),  # Coulomb and a constant torque
         (QUADRANT, [1, 1, -1, -1], [10, -10, 10, -10], [2.0, 0.5, -0.5, -2.0]),
         (Friction("f", quadratic=0.5), [2.0, -2.0], 1.0, [2.0, -2.0]),
-        (Friction("f", viscous=1.0, asymmetry=0.25), [2.0, -2.0], 1.0, [2.5, -1.5]),
-        (Friction("f", saturating=3.0, saturation_speed=0.5), [0.5, -50], 0.0, [2.284782, -3.0]),
         # Over a transition velocity: one standard deviation of the Gaussian at it, whole beyond.
         (Friction("f", coulomb=2.0, rise=0.1), [0.1, -0.1, 1.0], 0.0, [1.365379, -1.365379, 2.0]),
     ],
