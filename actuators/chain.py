@@ -74,7 +74,7 @@ class Chain:
         motor   the elements in a row                         `at_motor`, `held`
 
     Raises:
-        LegwattError: A name stands twice, a stage names no element, or the shaft has no name.
+        LegwattError: A name stands twice.
     """
 
     name: str  #: Of the drivetrain option, or of the joint.
@@ -101,19 +101,9 @@ class Chain:
     gains: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        names = [e.name for e in (*self.output, *self.elements)]
-        whole = [*names, self.motor.name] if self.motor else names
+        whole = [e.name for e in (*self.output, *self.elements, self.motor) if e]
         if twice := [name for name in whole if whole.count(name) > 1]:
             raise LegwattError(f"{self.name}: element '{twice[0]}' stands twice: rename one")
-        if not self.stages:
-            return
-        at = [name for name in names if name in self.stages.values()]
-        if [*self.stages.values()] != at or {JOINT_STAGE, SUPPLY_STAGE} & set(self.stages):
-            raise LegwattError(
-                f"{self.name}: stages must follow elements, in order, and not be named out or el"
-            )
-        if at[-1] != names[-1]:
-            raise LegwattError(f"{self.name}: name the stage after the last element")
 
     @property
     def path(self) -> tuple[Element, ...]:

@@ -3,7 +3,7 @@
 Copper: R = R0 (1 + 0.00393 dT) (IEC 60028). Neodymium magnets lose about 0.11 % per kelvin, and
 the torque constant with them. The temperature follows from one thermal node,
 
-    time_constant d(dT)/dt = rise + thermal_resistance R I^2 - dT,    dT(0) = initial
+    time_constant d(dT)/dt = rise + thermal_resistance R I^2 - dT,    dT(0) = 0
 
 with the warm winding's own R; where a sensor on the housing is read, a winding in balance with it
 adds sensor_gain (T - 25 degC).
@@ -38,7 +38,6 @@ class Heating(Numbers):
     time_constant: float = number("", "positive", 10.0)  #: [s].
     #: Warming that is not the motor's own, reached after some time constants [K].
     rise: float = number(rule="signed")
-    initial: float = number(rule="signed")  #: Warmer than the data sheet's when the log starts [K].
     #: Warming of the winding over that of the housing's sensor [1].
     sensor_gain: float = number(rule="signed")
 
@@ -56,7 +55,7 @@ class Heating(Numbers):
         small = np.abs(decay) < 1e-12
         blend = step * np.where(small, 1.0, -np.expm1(-decay) / np.where(small, 1.0, decay))
         drive = (blend * (self.rise + own[:-1])).tolist()
-        level = self.initial
+        level = 0.0
         result = [level]
         for factor, more in zip(keep.tolist(), drive, strict=True):
             level = factor * level + more

@@ -55,7 +55,8 @@ class ElementEntry(Table):
 
 
 def _stages_differ(elements: tuple[ElementEntry, ...]) -> tuple[ElementEntry, ...]:
-    stages = [element.stage for element in elements if element.stage]
+    own = [element.stage for element in elements if element.stage]
+    stages = [JOINT_STAGE, *own, SUPPLY_STAGE]
     if len(set(stages)) != len(stages):
         raise ValueError(f"a stage is named twice among {', '.join(stages)}")
     if not elements[-1].stage:

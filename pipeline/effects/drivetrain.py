@@ -24,9 +24,8 @@ _LARGEST_STRIBECK_SPEED: Final = 0.5  # [rad/s]
 #: known than its width: at 2 dry friction has 95 % of its level.
 _REVERSED: Final = 2.0
 _LARGEST_EXCESS: Final = 3.0  # of break-away over Coulomb friction, in Coulomb friction
-#: Terms of the law that are forces, and those that are shares of the load.
+#: Terms of the law that are shares of the load.
 _SHARES: Final = ("load", "when_driving", "when_driven")
-_LEVELS: Final = ("coulomb", "viscous", "skew", "excess", "quadratic", *_SHARES)
 #: How dry friction changes its sense at a reversal: of the joint, whatever the law.
 REVERSAL: Final = ("rise", "travel")
 
@@ -86,13 +85,18 @@ class DirectionDependentFriction(Effect):
 
 
 class FrictionFactor(Effect):
-    """Friction that the files state, all of it times a factor: at all joints alike, or at one.
+    """Friction that the files state, some of its terms times a factor: at all joints, or at one.
 
-    What a data sheet assumed of a gear, or what an earlier log showed, where it has changed since.
+    What a data sheet assumed of a gear, or what an earlier log showed, where it has changed since;
+    by the load alone, a gear of another efficiency.
     """
 
-    name = "friction_factor"
-    terms: tuple[str, ...] = _LEVELS  #: Of the law that are multiplied.
+    name = "factor"
+
+    @property
+    def terms(self) -> list[str]:
+        """Of the law that are multiplied."""
+        return self.acts["more"].split()
 
     def places(self, model: MachineModel, m: Measured) -> list[Place]:
         """All joints together, then each, as far as files state friction there."""
@@ -105,21 +109,14 @@ class FrictionFactor(Effect):
         return [(EVERY,), *rubbing] if len(rubbing) > 1 else rubbing
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
-        """Multiply every term."""
-        factor = max(1.0 + x["more"], 0.0)
+        """Multiply the terms."""
+        factor, terms = max(1.0 + x["more"], 0.0), self.terms
         for joint in model.joints if place == (EVERY,) else place[:1]:
             chain = model.actuator(joint)
             parts = ("elements", "output")
-            rows = {n: [_times(e, factor, self.terms) for e in getattr(chain, n)] for n in parts}
+            rows = {n: [_times(e, factor, terms) for e in getattr(chain, n)] for n in parts}
             model = self.at_joint(model, (joint,), **{n: tuple(row) for n, row in rows.items()})
         return model
-
-
-class GearLossFactor(FrictionFactor):
-    """Friction by the load that the files state, times a factor: a gear of another efficiency."""
-
-    name = "gear_loss_factor"
-    terms = _SHARES
 
 
 def _times(element: Element, factor: float, of: Sequence[str]) -> Element:

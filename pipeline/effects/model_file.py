@@ -16,7 +16,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
 import tomlkit
-from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Strict, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, Strict, model_validator
 
 from actuators.checked import Names, Number, Pair, Table, Text, checked, read_toml
 from actuators.errors import LegwattError, known, one_line
@@ -116,7 +116,7 @@ class ModelFile(Table):
     #: empty where no log was compared.
     noise: dict[_Channel, dict[str, Annotated[Number, Field(ge=0.0)]]] = Field(default_factory=dict)
     #: Files whose contents are no longer those of the hashes, in words.
-    _changed: tuple[str, ...] = PrivateAttr(())
+    changed: tuple[str, ...] = Field(default=(), exclude=True)
 
     @property
     def robot(self) -> Path:
@@ -128,11 +128,6 @@ class ModelFile(Table):
         """Actuator of the catalogue; empty for none."""
         return self.actuators.alternative
 
-    @property
-    def changed(self) -> tuple[str, ...]:
-        """Files whose contents are no longer those of the hashes, in words."""
-        return self._changed
-
     def with_edits(self, edits: Sequence[Edit]) -> ModelFile:
         """The same with further edits at the end."""
         return self.model_copy(update={"edits": (*self.edits, *edits)})
@@ -143,14 +138,13 @@ class ModelFile(Table):
             catalog = actuator_folder(load_robot_file(robot))
         files = {(catalog or CATALOG) / Path(n).name: s for n, s in self.actuators.sha256.items()}
         named = self.named.model_copy(update={"file": robot})
-        file = self.model_copy(update={"named": named})
-        file._changed = tuple(
+        changed = tuple(
             f"{where}: {one_line(path.name)} is not the one its effects were found with (other "
             "SHA-256): they may not fit it any more"
             for path, written in ({robot: self.named.sha256} | files).items()
             if not (path.exists() or path == robot) or file_sha256(path) != written
         )
-        return file
+        return self.model_copy(update={"named": named, "changed": changed})
 
 
 def file_sha256(path: Path) -> str:

@@ -133,30 +133,23 @@ def leg_chains(
     index of the joint that carries the base (0 for a fixed one). `joints`: names of all columns.
 
     Raises:
-        LegwattError: A joint or frame is missing, of several coordinates, or not the child of the
-            one before.
+        LegwattError: A joint or frame is missing, a joint is of several coordinates, or the joints
+            are not those from the base to the foot.
     """
     paths, frames = [], []
     for leg, names, foot in legs:
-        where, path = f"leg '{leg}'", [base_joint]
+        where, moving = f"leg '{leg}'", list(model.names)[1:]
         for name in names:
-            if model.existFrame(name, pin.FrameType.FIXED_JOINT):
-                raise LegwattError(f"{where}: joint '{name}' is fixed; list those that move")
-            known(f"{where}: the URDF has no joint", name, list(model.names)[1:])
-            path.append(int(model.getJointId(name)))
-            parent = model.parents[path[-1]]
-            if parent != path[-2]:
-                words = f"hangs on '{model.names[parent]}', not on '{model.names[path[-2]]}'"
-                raise LegwattError(f"{where}: joint '{name}' {words}; list joints outward")
-            if model.joints[path[-1]].nq != 1:
-                raise LegwattError(f"{where}: joint '{name}' is of several coordinates")
+            known(f"{where}: the URDF has no joint that moves", name, moving)
         known(f"{where}: the URDF has no frame", foot, [f.name for f in model.frames])
         frames.append(model.frames[model.getFrameId(foot)])
-        carrier = frames[-1].parentJoint
-        if carrier != path[-1]:
-            words = f"is not carried by '{names[-1]}', the last of its joints"
-            raise LegwattError(f"{where}: foot '{foot}' {words}, but by '{model.names[carrier]}'")
-        paths.append(tuple(path[1:]))
+        path = [k for k in model.supports[frames[-1].parentJoint] if k > base_joint]
+        if (chain := [str(model.names[k]) for k in path]) != [*names]:
+            words = f"list the joints outward from base to foot '{foot}': {', '.join(chain)}"
+            raise LegwattError(f"{where}: {words}")
+        if several := [name for name, k in zip(names, path, strict=True) if model.joints[k].nq > 1]:
+            raise LegwattError(f"{where}: joint '{several[0]}' is of several coordinates")
+        paths.append(tuple(path))
     lean = pin.Model()  # without the frames of sensors and shells, which would be placed each time
     for k in range(1, model.njoints):
         lean.addJoint(model.parents[k], model.joints[k], model.jointPlacements[k], model.names[k])

@@ -214,13 +214,8 @@ def exported(
     numbers = {a.name: joint_numbers(edited, a) for a in edited.actuators}
     whole = [e for e in file.edits if e.effect not in CARRIED and not of_bodies([e])]
     left = (*(f"{e.effect} at {place_text(e.place)}" for e in whole), *LEFT[to])
-    found = [
-        f"{e.effect} at {place_text(e.place)}: "
-        + ", ".join(f"{p.name} {p.value:.6g} {p.unit}" for p in e.parameters)
-        for e in file.edits
-    ]
-    head = f"{edited.name} with what gap found ({one_line(model.name)}):"
-    lines = [head, *(found or ["nothing"]), "Not carried over:", *left]
+    head = f"{edited.name} with what gap found ({one_line(model.name)}), not carried over:"
+    lines = [head, *left]
     comment = "\n" + "\n".join(line.replace("--", "- -") for line in lines) + "\n"
     source = (machine.robot.urdf, str(machine.path), machine.bare_model, file.edits)
     root = parse_elements(corrected_urdf(*source, merged=to == "mjcf"), str(machine.path))

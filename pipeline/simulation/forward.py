@@ -133,9 +133,9 @@ class ForwardSimulator:
         """By row and share of its step: the bridge, and the motors' torque constants [N*m/A]."""
         motors = []
         for k, a in enumerate(self._actuators):
-            rise = np.full(servo.time.size, 0.0 if a.heating is None else a.heating.initial)
+            rise = np.zeros(servo.time.size)
             if a.heating is not None and servo.temperature is not None:
-                rise = rise + a.heating.sensed(servo.temperature[:, k])
+                rise += a.heating.sensed(servo.temperature[:, k])
             motors.append(warmed(a.driven, rise))
         constant = np.stack([np.asarray(motor.torque_constant) for motor in motors], axis=1)
         resistance = np.stack([np.asarray(motor.resistance) for motor in motors], axis=1)

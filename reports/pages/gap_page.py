@@ -15,7 +15,6 @@ import numpy as np
 
 from pipeline.effects.base import EVERY
 from pipeline.effects.bodies import AXES, RigidBodyParameters
-from pipeline.effects.drivetrain import FrictionFactor
 from pipeline.identification.residual import WHOLE
 from pipeline.identification.results import INDISTINGUISHABLE, UNEXPLAINED
 from pipeline.identification.supply import account
@@ -82,7 +81,7 @@ def _laws(joints: Sequence[str], tables: Tables) -> list[dict[str, Any]]:
     found, classes = tables["found"], _classes(tables["candidates"])
     names = found[found["effect"] != RigidBodyParameters.name]
     if "changed" in tables:
-        names = names[names["effect"] != FrictionFactor.name]
+        names = names[names["effect"] != "friction_factor"]
     laws = [*names.groupby(["written", "effect"], sort=False)]
     laws.sort(key=lambda law: (not law[0][0], -law[1]["place"].nunique()))
     out = []
@@ -127,7 +126,7 @@ def changed(tables: Tables) -> list[str]:
         else:
             far = ", ".join(number(by[f"first moment {axis}"]["value"], 2) for axis in AXES)
             said.append(f"first moment of {link} by {far} kg·m")
-    for row in rows[rows["what"] == FrictionFactor.name].to_dict("records"):
+    for row in rows[rows["what"] == "friction_factor"].to_dict("records"):
         more, ends = row["value"] - 1.0, (row["ci_low"] - 1.0, row["ci_high"] - 1.0)
         low, high = sorted(abs(100.0 * end) for end in ends)
         said.append(

@@ -168,8 +168,8 @@ def test_heating_solves_its_equation_for_a_current_that_changes():
     rng = np.random.default_rng(6)
     time = np.cumsum(rng.uniform(0.05, 1.5, 30))
     loss = rng.uniform(0.0, 40.0, 30)
-    node = Heating(thermal_resistance=3.0, time_constant=7.0, rise=5.0, initial=12.0)
-    level, expected = 12.0, [12.0]
+    node = Heating(thermal_resistance=3.0, time_constant=7.0, rise=5.0)
+    level, expected = 0.0, [0.0]
     for k in range(29):
         pull = lambda t, x, p=loss[k]: (5.0 + 3.0 * p * (1.0 + 0.00393 * x) - x) / 7.0  # noqa: E731
         solved = solve_ivp(pull, time[k : k + 2], [level], rtol=1e-10, atol=1e-10)

@@ -43,10 +43,10 @@ def test_joints_outside_the_legs_are_held_and_their_torque_is_told(mixed):
         (LEG1, '["leg1_0", "leg0_1"]', "joint 'leg0_1' belongs to two legs"),
         ('side = "left"', 'side = "port"', "'legs.leg0.side': 'port': known: left, right"),
         (FOOT1, f"{FOOT1}\nstart_posture = [0]", "as many numbers as there are joints, 2"),
-        (LEG1, '["leg1_0", "leg1_tip"]', "joint 'leg1_tip' is fixed"),
-        (LEG1, '["leg1_1", "leg1_0"]', "'leg1_1' hangs on 'leg1_0', not on"),
+        (LEG1, '["leg1_0", "leg1_tip"]', "no joint that moves 'leg1_tip'"),
+        (LEG1, '["leg1_1", "leg1_0"]', "outward from base to foot 'leg1_foot': leg1_0, leg1_1"),
         (FOOT1, 'foot = "leg1_fot"', "no frame 'leg1_fot': .* 'leg1_foot'"),
-        (FOOT1, 'foot = "leg2_foot"', "'leg2_foot' is not carried by 'leg1_1'"),
+        (FOOT1, 'foot = "leg2_foot"', "from base to foot 'leg2_foot': leg2_0"),
         ('"leg1_0" type="revolute"', '"leg1_0" type="planar"', "'leg1_0' is of several coord"),
     ],
 )
