@@ -13,7 +13,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter, percentile_filter
 
 from actuators.arrays import Array, Mask
@@ -57,10 +56,6 @@ _CHANGES, _ROWS = 12.0, 6.0
 _CHANCE: Final = 1e-6
 #: Rows that hold one value are looked at from this many on.
 _LEAST_RUN: Final = 20
-#: Consecutive rows that have to agree in every number; a sensor's noise alone never does.
-_RUN: Final = 8
-#: Share of the shorter log's runs from which two logs count as the same data.
-_SHARE: Final = 0.02
 #: What positions beyond the limits of a joint may be.
 _DEGREES: Final = (
     "looks like degrees, or a motor's angle; in a mapping file: "
@@ -80,16 +75,15 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], Recording]
         expected: The robot's limits.
 
     Returns:
-        Findings, of which some may refuse the log, and the log with what of it is good.
+        Findings, of which some may refuse the log, and the log, in which cells that are not good
+        are empty.
     """
-    found = Findings(log.name)
+    found, frame = Findings(log.name), dict[str, Array]()
     found += log.findings
-    shape = len(log), len(log.joints)
-    usable = np.zeros(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_)
     few, detail = len(log) < FEWEST_ROWS, f"{len(log)} rows; at least {FEWEST_ROWS} are needed"
     found.note("", "rows", len(log), "1", "refused" if few else "ok", detail)
     if few:
-        return found, replace(log, judged=usable)
+        return found, log
     _rate(log, found)
     off, silent = log.torque_off, 0
     for j, joint in enumerate(log.joints):
@@ -100,31 +94,31 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], Recording]
             detail = f"holds no number at all, and its {log.effort} does: where did it move?"
             found.note(column, "empty", 1, "1", "refused", detail)
             continue
-        moving = ~standstill(q)
-        usable[0][:, j] = _good(log.time, q, moving, column, "rad", found)
+        moving, own = ~standstill(q), column_name(joint, log.effort)
+        frame[column_name(joint, "position")] = _good(log.time, q, moving, column, "rad", found)
+        frame[own] = np.full(len(log), np.nan)
         if _silent(log, joint, q, x, found):
             silent += 1
             continue
-        column = column_name(joint, log.effort)
-        usable[1][:, j] = _good(log.time, x, moving, column, log.unit, found)
+        frame[own] = _good(log.time, x, moving, own, log.unit, found)
         if off is not None and off[:, j].any():
             bridge = log.torque_off_bridge or "not stated (open or shorted?)"
             detail = f"{int(off[:, j].sum())} rows with the drive off; bridge {bridge}"
-            found.note(column, "torque_off", float(off[:, j].mean()), "1", "masked", detail)
-            usable[1][off[:, j], j] = False
+            found.note(own, "torque_off", float(off[:, j].mean()), "1", "masked", detail)
+            frame[own] = np.where(off[:, j], np.nan, frame[own])
+    good = replace(log, frame=log.frame.assign(**frame))
     if all(is_constant(log.position_of(joint)) for joint in log.joints):
         found.note("", "constant", 1, "1", "refused", "no joint moves; nothing can be compared")
     elif silent == len(log.joints) and not log.supply_alone:
         detail = f"no joint that moves has a live {log.effort}; nothing can be compared"
         found.note("", "empty", 1, "1", "refused", detail)
-    if usable[0].any(axis=0).all():
-        _limits(log, expected, usable[0], found)
+    _limits(good, expected, found)
     _feet_carry(log, expected.weight, found)
     if log.ignored:
         found.note("", "ignored_columns", len(log.ignored), "1", "ok", ", ".join(log.ignored))
     for channel, formula in log.derived.items():
         found.note("", "derived", 1, "1", "ok", f"{channel} computed as {formula}")
-    return found, replace(log, judged=usable)
+    return found, good
 
 
 def _rate(log: Recording, found: Findings) -> None:
@@ -143,14 +137,14 @@ def _rate(log: Recording, found: Findings) -> None:
         found.note("time_s", "gaps", gaps, "1", "masked", detail)
 
 
-def _good(time: Array, x: Array, moving: Mask, column: str, unit: str, found: Findings) -> Mask:
-    """Rows of a column that may be used, shape (N,), by the table of checks."""
+def _good(time: Array, x: Array, moving: Mask, column: str, unit: str, found: Findings) -> Array:
+    """A column (N,) without what may not be used by the table of checks."""
     good = np.isfinite(x)
     missing = int((~good).sum())
     if 0 < missing < x.size:
         found.note(column, "missing", missing / x.size, "1", "masked", f"{missing} empty cells")
     if is_constant(x):
-        return good
+        return x
     step = quantum(x)
     for check in (c for c in CHECKS if unit != "rad" or not c.efforts_only):
         kept = good if check.name == "frozen" else np.ones_like(good)
@@ -166,7 +160,7 @@ def _good(time: Array, x: Array, moving: Mask, column: str, unit: str, found: Fi
         found.note(column, check.name, float(odd.mean()), "1", verdict, detail)
         if not passes:
             good &= ~odd
-    return good
+    return np.where(good, x, np.nan)
 
 
 def _silent(log: Recording, joint: str, q: Array, x: Array, found: Findings) -> bool:
@@ -193,13 +187,13 @@ def _silent(log: Recording, joint: str, q: Array, x: Array, found: Findings) -> 
     return silent
 
 
-def _limits(log: Recording, expected: Expected, ok: Mask, found: Findings) -> None:
-    """Good positions (N, J) against the limits of the joints, efforts against those of drives."""
+def _limits(log: Recording, expected: Expected, found: Findings) -> None:
+    """Good positions against the limits of the joints, efforts against those of drives."""
     for j, joint in enumerate(log.joints):
-        q, column = (
-            log.position_of(joint)[ok[:, j]],
-            column_name(joint, log.position_quantity(joint)),
-        )
+        q, column = log.position_of(joint), column_name(joint, log.position_quantity(joint))
+        q = q[np.isfinite(q)]
+        if not q.size:
+            continue
         low, high = float(expected.lower[j]), float(expected.upper[j])
         detail = f"runs from {q.min():.4g} to {q.max():.4g} rad, the joint's limits are "
         detail += f"{low:.4g} to {high:.4g} rad: "
@@ -252,35 +246,17 @@ def _feet_carry(log: Recording, weight: float | None, found: Findings) -> None:
 
 
 def refuse_repeats(logs: Sequence[Recording]) -> None:
-    """Refuse logs that hold the same rows, in whole or in part.
-
-    Args:
-        logs: Of one robot.
+    """Refuse a log that is given twice.
 
     Raises:
-        LegwattError: Two logs share runs of rows in which a joint moves.
+        LegwattError: Names both.
     """
-    runs = [(log, _runs(log)) for log in logs if len(logs) > 1]
-    for (one, a), (other, b) in combinations(runs, 2):
-        same = np.intersect1d(a, b, assume_unique=True).size
-        if same > max(_RUN, _SHARE * min(len(one), len(other))):
+    for one, other in combinations(logs, 2):
+        if one.sha256 == other.sha256:
             raise LegwattError(
-                f"{one.name} and {other.name} hold the same measurements ({same} rows): test "
-                "data must be data of their own, and data given twice count twice; leave one out"
+                f"{one.name} and {other.name} are the same file: test data must be data of their "
+                "own, and data given twice count twice; leave one out"
             )
-
-
-def _runs(log: Recording) -> NDArray[np.uint64]:
-    """A number per run of rows, in which a joint moves, that equal runs share and others do not."""
-    names = [column_name(joint, q) for joint in log.joints for q in ("position", log.effort)]
-    table = log.frame[[name for name in names if name in log.frame]]
-    own = np.asarray(pd.util.hash_pandas_object(table, index=False), dtype=np.uint64)
-    if own.size < _RUN:
-        return own[:0]
-    changes = np.convolve(own[1:] != own[:-1], np.ones(_RUN - 1), mode="valid")
-    key = np.random.default_rng(0).integers(2**63, size=_RUN, dtype=np.uint64)
-    runs = np.convolve(own, 2 * key + 1, mode="valid")  # wraps around, as hashes do
-    return np.unique(runs[changes >= _RUN / 2])  # at rest it repeats
 
 
 def own_spacing(time: Array) -> float:

@@ -48,11 +48,6 @@ Rows = NDArray[np.intp]
 GAP: Final = 2.5
 #: Times that lie this near to the grid, in steps, need no interpolation.
 JITTER_IGNORED: Final = 0.05
-#: Spectra and noise are taken from at most this many stretches of this many rows.
-STRETCHES: Final = 8
-STRETCH_ROWS: Final = 16_384
-#: Rows between two looked at: the speed of a robot changes little within them.
-EVERY: Final = 8
 
 
 @dataclass(frozen=True)
@@ -297,8 +292,9 @@ class Grid:
         nearer = time[right] - whole < whole - time[right - 1]
         return cls(whole, pieces_of(map(len, parts)), np.where(nearer, right, right - 1))
 
-    def bridged(self, time: Array, x: Array, ok: Mask) -> Array:
-        """Good values (N,) of the log's rows, straight between them, on the grid; else zeros."""
+    def bridged(self, time: Array, x: Array) -> Array:
+        """Values (N,) of the log's rows, straight between those that are none; else zeros."""
+        ok = np.isfinite(x)
         return np.interp(self.time, time[ok], x[ok]) if ok.any() else np.zeros(self.time.size)
 
     def missing(self, time: Array, ok: Mask, longest: float) -> Mask:
@@ -355,28 +351,12 @@ def most_telling(x: Array, spans: Sequence[slice], count: int) -> list[int]:
     return sorted({*best.tolist(), *others[places[: others.size]].tolist()})
 
 
-def busiest(coarse: Array, pieces: Sequence[slice]) -> list[slice]:
-    """Stretches of a long log that are enough to know its spectrum and noise.
-
-    The pieces themselves where they are short, else up to `STRETCHES` of `STRETCH_ROWS` rows.
-    `coarse` is every `EVERY`-th row of the log, shape (N / EVERY, C).
-    """
-    if sum(map(rows_of, pieces)) <= STRETCHES * STRETCH_ROWS:
-        return list(pieces)
-    parts = cut(pieces, STRETCH_ROWS, whole=True)
-    if not parts:
-        return sorted(pieces, key=rows_of)[-STRETCHES:]
-    starts, rows = [part.start // EVERY for part in parts], STRETCH_ROWS // EVERY - 1
-    spans = [slice(start, start + rows) for start in starts]
-    return [parts[k] for k in most_telling(np.diff(coarse, axis=0), spans, STRETCHES)]
-
-
-def cut(pieces: Sequence[slice], rows: int, *, whole: bool = False) -> list[slice]:
-    """Pieces in stretches of so many rows; those that are shorter too, unless `whole`."""
+def cut(pieces: Sequence[slice], rows: int) -> list[slice]:
+    """Pieces in stretches of so many rows; the last ones are shorter."""
     return [
         slice(start, min(start + rows, p.stop))
         for p in pieces
-        for start in range(p.start, p.stop - (rows - 1) * whole, rows)
+        for start in range(p.start, p.stop, rows)
     ]
 
 

@@ -10,6 +10,7 @@ as many cells in the header as below it, and a comma inside a number is a decima
 from __future__ import annotations
 
 import csv
+import gzip
 import hashlib
 import re
 from array import array
@@ -186,11 +187,12 @@ def _parquet(path: Path, columns: Sequence[str]) -> Iterator[Any]:
 
 def _csv(path: Path) -> Source:
     """A text of cells; lines above the header are passed over, and a ``#`` before it."""
-    where = one_line(path.name)
-    with path.open("rb") as stream:
+    where, packed = one_line(path.name), path.suffix == ".gz"
+    with (gzip.open if packed else open)(path, "rb") as stream:
         head = stream.read(_HEAD_BYTES)
-        stream.seek(max(path.stat().st_size - 1, 0))
-        cut = stream.read() not in (b"\n", b"\r")  # while the last row was written
+        if cut := bool(head) and not packed:  # while the last row was written
+            stream.seek(-1, 2)
+            cut = stream.read() not in (b"\n", b"\r")
     if not head.strip():
         raise LegwattError(f"{where}: the file is empty; give a log as CSV or Parquet")
     if b"\x00" in head[:4096]:

@@ -26,12 +26,8 @@ from actuators.arrays import Array
 from actuators.errors import LegwattError, known
 from pipeline.logs.checks import judge, new_values, refuse_repeats
 from pipeline.logs.filters import (
-    EVERY,
     LARGEST_SHARE,
-    STRETCH_ROWS,
-    STRETCHES,
     LowPass,
-    busiest,
     cut,
     most_telling,
     pieces_of,
@@ -109,6 +105,8 @@ _APART: Final = 1000.0
 #: Rows of all logs together that estimation works on, and of one stretch of a longer log.
 MOST_ROWS: Final = 60_000
 _STRETCH_ROWS: Final = 1000
+#: Spectra and what noise matters are told by at most this many stretches of this many rows.
+_SHORT: Final = (8, 16_384)
 
 
 @dataclass(frozen=True)
@@ -176,9 +174,10 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
             f"the logs are compared in different channels ({', '.join(sorted(channels))}); set "
             "effort in a mapping file"
         )
-    settings = choose_settings(read, cutoff=asked.cutoff, thinned=asked.thinned)
+    short = [*map(_short, read)]
+    settings = choose_settings(short, cutoff=asked.cutoff, thinned=asked.thinned)
     if asked.cutoff is None and asked.felt is not None:
-        looked = [reduced(_short(log), settings, asked.robot) for log in read]
+        looked = [reduced(log, settings, asked.robot) for log in short]
         settings = _naming(settings, looked, asked.felt)
     tested, rule = _tested(read, fitted, asked.prove_last)
     if not asked.apart and len(read) > MANY:
@@ -212,7 +211,7 @@ def _together(logs: Sequence[Recording]) -> list[Recording]:
 
 def _as_one(logs: Sequence[Recording]) -> Recording:
     """Logs of the same columns as one, in which each begins long after the one before."""
-    frames, begin, (good, felt) = [], 0.0, zip(*(log.good for log in logs), strict=True)
+    frames, begin = [], 0.0
     for log in logs:
         frames.append(log.frame.assign(**{TIME: log.time - log.time[0] + begin}))
         begin = float(frames[-1][TIME].iloc[-1]) + _APART
@@ -220,7 +219,6 @@ def _as_one(logs: Sequence[Recording]) -> Recording:
         logs[0],
         name=logs[0].name if len(logs) == 1 else f"{logs[0].name} to {logs[-1].name}",
         frame=pd.concat(frames, ignore_index=True),
-        judged=(np.concatenate(good), np.concatenate(felt)),
         sha256=hashlib.sha256("".join(log.sha256 for log in logs).encode()).hexdigest(),
     )
 
@@ -287,13 +285,14 @@ def without_useless(names: Sequence[str], fitted: int, useless: Mapping[int, str
 
 
 def _short(log: Recording) -> Recording:
-    """What of a long log tells its noises: where it moves most."""
-    if len(log) <= STRETCHES * STRETCH_ROWS:
+    """What of a long log tells its spectra and noises: where it moves most."""
+    count, rows = _SHORT
+    if len(log) <= count * rows:
         return log
-    parts = busiest(log.position[::EVERY], [slice(0, len(log))])
-    rows = np.concatenate([np.arange(part.start, part.stop) for part in parts])
-    frame = log.frame.iloc[rows].reset_index(drop=True)
-    return replace(log, frame=frame, judged=(log.good[0][rows], log.good[1][rows]))
+    spans = cut([slice(0, len(log))], rows)
+    kept = [spans[k] for k in most_telling(np.diff(log.position, axis=0), spans, count)]
+    at = np.concatenate([np.arange(span.start, span.stop) for span in kept])
+    return replace(log, frame=log.frame.iloc[at].reset_index(drop=True))
 
 
 def _naming(settings: Settings, logs: Sequence[Log], felt: Callable[[Log], Array]) -> Settings:
@@ -326,8 +325,8 @@ def step_rate(log: Log) -> tuple[int, float]:
     """
     assert log.recording is not None
     j = int(np.nanargmax(np.ptp(log.q, axis=0)))
-    q, good = log.recording.position_of(log.joints[j]), log.recording.good[0][:, j]
-    return j, new_values(log.recording.time[good], q[good])
+    q = log.recording.position_of(log.joints[j])
+    return j, new_values(log.recording.time[np.isfinite(q)], q[np.isfinite(q)])
 
 
 def with_rest(logs: Sequence[Log]) -> list[Log]:
@@ -356,9 +355,6 @@ def _seen(log: Log, settings: Settings) -> list[Finding]:
     found, read = Findings(log.name), log.recording
     assert read is not None
     found += log.findings
-    if len(log) < (every := len(read) / settings.step) * 0.9 and len(log) > 0.9 * MOST_ROWS:
-        detail = f"{len(log)} of {every:.0f} rows at the bandwidth are used, those that tell most"
-        found.note("", "rows_used", len(log), "1", "ok", detail)
     j, rate = step_rate(log)
     if rate < min(log.bandwidth, LEAST_CUTOFF) and read.column(log.joints[j], "velocity") is None:
         detail = (

@@ -190,8 +190,6 @@ class Recording:
     findings: tuple[Finding, ...] = ()  #: What reading saw.
     ignored: tuple[str, ...] = ()  #: Columns of the file that were not used.
     sha256: str = ""  #: Of the file.
-    #: Which positions and which efforts are good, each (N, J), by a judgement.
-    judged: tuple[Mask, Mask] | None = None
     #: Name in the log format to the file's column and the mapping's rule for it.
     rules: Mapping[str, tuple[str, ColumnTable]] = field(default_factory=dict)
 
@@ -202,15 +200,6 @@ class Recording:
     def time(self) -> Array:
         """Strictly increasing, shape (N,) [s]."""
         return self.frame[TIME].to_numpy()
-
-    @property
-    def good(self) -> tuple[Mask, Mask]:
-        """Which positions and which efforts are good, each (N, J); without a judgement numbers."""
-        if self.judged is not None:
-            return self.judged
-        effort = self.of(self.effort)
-        none = np.full((len(self), len(self.joints)), np.nan)
-        return np.isfinite(self.position), np.isfinite(none if effort is None else effort)
 
     @property
     def clock(self) -> Array:
@@ -244,6 +233,12 @@ class Recording:
         if owner in ("base", "supply"):
             return self.column(owner, quantity)
         return self._stacked([column_name(joint, quantity) for joint in self.joints])
+
+    @property
+    def efforts(self) -> Array:
+        """The compared ones, shape (N, J), in `unit`; NaN where there is none."""
+        every = self.of(self.effort)
+        return np.full((len(self), len(self.joints)), np.nan) if every is None else every
 
     @property
     def position(self) -> Array:

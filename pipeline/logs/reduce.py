@@ -19,13 +19,11 @@ from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
 from pipeline.logs.checks import own_spacing, quantum
 from pipeline.logs.filters import (
-    EVERY,
     FLAT,
     LARGEST_SHARE,
     SEEN,
     Grid,
     LowPass,
-    busiest,
     by_piece,
     choose_cutoff,
     pieces_of,
@@ -76,7 +74,8 @@ def _lowest(robot: Robot, log: Recording) -> Mask:
     """Feet (N, F) within `LOWEST` of the lowest one along the vertical."""
     blocks = [slice(k, k + 4096) for k in range(0, len(log), 4096)]
     place = partial(foot_positions, robot.chains)
-    feet = by_piece(place, robot.chains.by_leg(log.position), blocks)
+    q = pd.DataFrame(log.position).ffill().bfill().to_numpy()
+    feet = by_piece(place, robot.chains.by_leg(q), blocks)
     angles = (log.of("base_roll"), log.of("base_pitch"))
     r, p = (np.zeros(len(log)) if angle is None else angle for angle in angles)
     # Third row of R_y(pitch) R_x(roll): the vertical in the base frame.
@@ -180,7 +179,7 @@ def choose_settings(
     asked, moved = [], []
     for log in logs:
         grid = Grid.under(log.time, dt, bridge=1.0 / (4.0 * held))
-        parts = [piece for piece in _busy(log, grid) if rows_of(piece) >= 64]
+        parts = [piece for piece in grid.pieces if rows_of(piece) >= 64]
         raw = [_position(log, j, grid) for j in range(len(log.joints))] if parts else []
         stretches = [np.stack([q[part] for q in raw], axis=1) for part in parts]
         if stretches:
@@ -193,11 +192,7 @@ def choose_settings(
         return Settings(dt, float(cutoff), "set by the user", least, thinned)
     per_joint = np.fmin.reduce(asked) if asked else np.full(1, np.nan)
     if np.isnan(per_joint).all():
-        every = [
-            log.position_of(joint)[ok]
-            for log in logs
-            for joint, ok in zip(log.joints, log.good[0].T, strict=True)
-        ]
+        every = [x[np.isfinite(x)] for log in logs for x in log.position.T]
         # Further than positions scatter from row to row.
         if not any(
             np.ptp(x) > SEEN * np.median(np.abs(np.diff(x, n=2))) for x in every if x.size >= 10
@@ -221,7 +216,7 @@ def _held(log: Recording) -> float:
     """Highest frequency that the slowest channel of a log holds [Hz]."""
     own = log.clock
     steps = [own_spacing(own)]
-    for good in log.good:
+    for good in map(np.isfinite, (log.position, log.efforts)):
         sparse = np.flatnonzero(good.any(axis=0) & ~good.all(axis=0))
         steps += [own_spacing(log.time[good[:, j]]) for j in sparse]
     slowest = max(step for step in steps if np.isfinite(step))
@@ -231,13 +226,7 @@ def _held(log: Recording) -> float:
 
 def _position(log: Recording, j: int, grid: Grid) -> Array:
     """Positions of joint `j` on the grid, bad ones bridged, shape (M,) [rad]."""
-    return grid.bridged(log.time, log.position_of(log.joints[j]), log.good[0][:, j])
-
-
-def _busy(log: Recording, grid: Grid) -> list[slice]:
-    """Stretches of the grid in which joints move most."""
-    coarse = [_position(log, j, grid)[::EVERY] for j in range(len(log.joints))]
-    return busiest(np.stack(coarse, axis=1), grid.pieces)
+    return grid.bridged(log.time, log.position_of(log.joints[j]))
 
 
 class _Reduction:
@@ -249,7 +238,6 @@ class _Reduction:
         self.grid = Grid.under(log.time, settings.dt, bridge=settings.bridged)
         kept = [np.arange(p.start, p.stop, settings.step) for p in self.grid.pieces]
         self.rows, self.pieces = np.concatenate(kept), pieces_of(map(len, kept))
-        self.busy = _busy(log, self.grid)
         self.contact = find_contact(log, robot)
         rate, cutoff = self.lowpass.rate, settings.cutoff
         self.above = LowPass(rate, max(settings.cutoff, settings.least))
@@ -270,23 +258,22 @@ class _Reduction:
             calm = ~np.asarray(near.any(axis=1))
         return calm if calm.mean() > _CALM else np.ones_like(calm)
 
-    def on_grid(self, x: Array, ok: Mask) -> tuple[Array, Mask, Mask]:
+    def on_grid(self, x: Array) -> tuple[Array, Mask, Mask]:
         """Values, short holes bridged; where they are missing; where the filter sees enough."""
-        missing = self.grid.missing(self.log.time, ok, self.settings.bridged)
+        missing = self.grid.missing(self.log.time, np.isfinite(x), self.settings.bridged)
         hidden = self.lowpass.share(missing, self.grid.pieces) if missing.any() else self.clear
-        return self.grid.bridged(self.log.time, x, ok), missing, hidden <= TOLERATED_SHARE
+        return self.grid.bridged(self.log.time, x), missing, hidden <= TOLERATED_SHARE
 
     def white(self, x: Array, ok: Mask) -> float:
         """Noise of a sample of a series (N,) on the grid."""
         good = (ok & self.calm)[:, None]
-        return float(smoother_noise(x[:, None], good, self.busy, self.above)[0])
+        return float(smoother_noise(x[:, None], good, self.grid.pieces, self.above)[0])
 
     def smooth(self, x: Array | None) -> Array | None:
         """Columns (N, ...) of what acts on the prediction and shares its bandwidth."""
         if x is None:
             return None
-        every = x.reshape(len(self.log), -1).T
-        on = [self.grid.bridged(self.log.time, c, np.isfinite(c)) for c in every]
+        on = [self.grid.bridged(self.log.time, c) for c in x.reshape(len(self.log), -1).T]
         out = self.lowpass.smooth(np.stack(on, axis=1), self.grid.pieces)
         return out[self.rows].reshape(-1, *x.shape[1:])
 
@@ -300,18 +287,18 @@ class _Reduction:
         """Of one joint what becomes a column of a `Log`'s motion."""
         log, lowpass, pieces = self.log, self.lowpass, self.grid.pieces
         joint, position = log.joints[j], log.position_of(log.joints[j])
-        raw, _, seen = self.on_grid(position, log.good[0][:, j])
+        raw, _, seen = self.on_grid(position)
         value, speed, rate = lowpass.derivatives(raw, pieces)
         other, scatter = lowpass.noises(raw, pieces)[2], self.white(raw, seen)
         coarse = max(np.nan_to_num(scatter), quantum(position) / np.sqrt(12.0))
         rate_noise = lowpass.gains[1:] * np.nan_to_num(scatter)
         speed_noise, measured = coarse * lowpass.gains[1], log.column(joint, "velocity")
         if measured is not None and np.isfinite(measured).any():
-            column, _, told = self.on_grid(measured, np.isfinite(measured))
-            noises, longest = (scatter, self.white(column, told)), max(self.busy, key=rows_of)
+            column, _, told = self.on_grid(measured)
+            noises = scatter, self.white(column, told)
             column = np.where(told, column, np.nan)
             factor, own = weigh(
-                self.grid.time, column, (speed, rate), seen, noises, lowpass, longest
+                self.grid.time, column, (speed, rate), seen, noises, lowpass, pieces
             )
             if abs(factor - 1.0) > FACTOR:
                 detail = f"is {factor:.3g} times the rate of the position and has no say; if its "
@@ -337,22 +324,18 @@ class _Reduction:
         series |= {"sign": by_piece(near, mean, pieces), "unsure": unsure}
         motor = None if log.at_motor else log.column(joint, "motor_position")
         if motor is not None and np.isfinite(motor).mean() >= 0.5:
-            ahead, _, told = self.on_grid(motor, np.isfinite(motor))
+            ahead, _, told = self.on_grid(motor)
             series["windup"] = np.where(told, lowpass.smooth(ahead, pieces) - value, np.nan)
         return {n: x[self.rows] for n, x in series.items()} | {"rate_noise": rate_noise}
 
-    def effort(self, channel: str, good: Mask | None, j: int) -> dict[str, Any]:
-        """Of one channel and joint values, noise, and where the filter sees enough.
-
-        `good`: good rows, shape (N, J); all numbers where it is None.
-        """
+    def effort(self, channel: str, j: int) -> dict[str, Any]:
+        """Of one channel and joint values, noise, and where the filter sees enough."""
         x, rows = self.log.column(self.log.joints[j], channel), self.rows
         x = np.full(len(self.log), np.nan) if x is None else x
-        ok = np.isfinite(x) if good is None else good[:, j]
-        on, missing, enough = self.on_grid(x, ok)
+        on, missing, enough = self.on_grid(x)
         smooth = np.where(missing, np.nan, self.lowpass.smooth(on, self.grid.pieces))
         noise = self.white(on, enough) * self.lowpass.gains[0]
-        raw = on if ok.any() else np.full(on.size, np.nan)
+        raw = on if np.isfinite(x).any() else np.full(on.size, np.nan)
         return {"effort": smooth[rows], "raw": raw[rows], "noise": noise, "felt": enough[rows]}
 
     def feet(self) -> dict[str, Any]:
@@ -376,7 +359,7 @@ class _Reduction:
         each = measured.reshape(len(self.log), -1).T
         good = np.repeat(stands, 3, axis=1).T
         noise = [
-            self.white(self.grid.bridged(self.log.time, x, np.isfinite(x)), stood)
+            self.white(self.grid.bridged(self.log.time, x), stood)
             for x, stood in zip(each, good, strict=True)
         ]
         shaking = [x for x in noise if x > 0.0]
@@ -398,10 +381,9 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
     if log.effort == "current" and log.of("voltage") is not None:
         channels = ("current", "voltage")
     motion = on.of_joints(on.motion)
-    first = on.of_joints(partial(on.effort, log.effort, log.good[1]))
-    every = [first, *(on.of_joints(partial(on.effort, c, None)) for c in channels[1:])]
+    every = [on.of_joints(partial(on.effort, channel)) for channel in channels]
     effort, noise = (np.stack([x[n] for x in every], axis=-1) for n in ("effort", "noise"))
-    felt: Mask = first["felt"]
+    felt: Mask = every[0]["felt"]
     # A joint without enough good samples has no floor of its own; it is masked anyway.
     usual = [np.nanmedian(x) if np.isfinite(x).any() else 1.0 for x in noise.T]
     if off is not None:
@@ -420,7 +402,7 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
     motion |= {x: on.smooth(log.of(x)) for x in ("base_roll", "base_pitch", "base_yaw")}
     warm = log.of("temperature")
     if warm is not None:  # known of every joint or of none
-        each = [on.grid.bridged(log.time, x, np.ones_like(x, np.bool_)) for x in warm.T]
+        each = [on.grid.bridged(log.time, x) for x in warm.T]
         warm = np.stack(each, axis=1)[rows] if np.isfinite(warm).all() else None
     out = Log(
         name=log.name,
@@ -440,7 +422,7 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
         temperature=warm,
         sha256=log.sha256,
         off=off,
-        raw=first["raw"],
+        raw=every[0]["raw"],
         recording=log,
         **motion,
         **(on.feet() if robot is not None else {}),
@@ -450,10 +432,4 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
         takers[DRIVE_OFF] = off if idle is None else off & ~idle
     out, found = out.without(takers), on.found
     found.note("", "cutoff", out.bandwidth, "Hz", "ok", settings.reason)
-    for j, joint in enumerate(log.joints):
-        share, column = float(out.mask[:, j].mean()), column_name(joint, log.effort)
-        verdict, detail = "ok" if share > 0.98 else "masked", f"{100 * share:.1f} % of the rows "
-        found.note(column, "usable_share", share, "1", verdict, detail + "can be compared")
-        detail = "within the bandwidth, from the band just above it"
-        found.note(column, "noise_floor", out.noise[j, 0], log.unit, "ok", detail)
     return replace(out, known=out.mask, findings=tuple(found))

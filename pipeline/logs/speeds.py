@@ -28,14 +28,15 @@ told here, too.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Final
 
 import numpy as np
-from scipy.signal import correlate, oaconvolve
+from scipy.signal import oaconvolve
 from scipy.special import erf
 
 from actuators.arrays import Array, Mask
-from pipeline.logs.filters import LowPass, runs_of
+from pipeline.logs.filters import LowPass, by_piece, runs_of
 
 #: Correlation with the position's rate below which a velocity column is another thing ...
 SAME: Final = 0.9
@@ -43,7 +44,9 @@ SAME: Final = 0.9
 FACTOR: Final = 0.3
 #: Standard deviations by which a difference has to exceed the noises to count as one.
 _SURE: Final = 4.0
-#: Lags are looked for up to this long [s].
+#: Share of the kernel's weight on other rows up to which a row's value is whole.
+_WHOLE: Final = 1e-6
+#: Delays that a velocity column may have [s].
 _LONGEST_LAG: Final = 0.1
 #: A wider band's speed is another than the filtered one where they differ by this many times the
 #: wider one's noise, root mean square over a period of the cut-off: its few independent samples
@@ -72,18 +75,18 @@ def weigh(
     ok: Mask,
     noises: tuple[float, float],
     lowpass: LowPass,
-    longest: slice,
+    pieces: Sequence[slice],
 ) -> tuple[float, tuple[Array, Array, Array] | None]:
     """Weigh a velocity column against the differentiated position.
 
     Args:
-        time: Uniform within `longest`, shape (N,) [s].
+        time: Shape (N,) [s].
         column: As measured, shape (N,) [rad/s]; NaN where it was not.
         rates: First and second derivative of the filtered position, each (N,).
         ok: Where the position's rate is good, shape (N,).
         noises: Standard deviation of a sample of position [rad] and of velocity [rad/s].
         lowpass: The filter.
-        longest: The longest stretch without a gap among those that tell most.
+        pieces: Stretches without a gap.
 
     Returns:
         Its factor, 1 where the two are not alike; and unless it says nothing the column at the
@@ -91,60 +94,35 @@ def weigh(
         the noise of both so averaged, each (2,).
     """
     good = ok & np.isfinite(column)
-    inside = np.array(ok[longest])
-    inside[: lowpass.half] = inside[inside.size - lowpass.half :] = False
-    if not np.isfinite(noises[1]) or good.mean() < 0.5 or not inside.any():
+    if not np.isfinite(noises[1]) or good.mean() < 0.5:
         return 1.0, None
-    filled = np.interp(time, time[good], column[good])
-    rate = np.where(ok[longest], rates[0][longest], np.nan)
-    seen = _skew(lowpass.smooth(filled[longest]), rate, 1.0 / lowpass.rate)
-    late, factor = (0.0, 1.0) if seen is None else seen
-    if seen is None or abs(factor - 1.0) > FACTOR:
+    filled, late = np.interp(time, time[good], column[good]), 0.0
+    good = lowpass.share(~good, pieces) < _WHOLE
+    if not good.any():
+        return 1.0, None
+    columns = np.stack([*rates, np.ones_like(time)], axis=1)[good]
+    for _ in range(4):  # f v(t - lag) is f v - f lag a
+        x = lowpass.smooth(np.interp(time + late, time, filled), pieces)[good]
+        factor, slope, zero = np.linalg.lstsq(columns, x, rcond=None)[0].tolist()
+        late -= slope / factor if factor else np.inf
+        if abs(late) > _LONGEST_LAG:
+            return 1.0, None
+    left = np.std(x - columns @ [factor, slope, zero])
+    if left > np.sqrt(1.0 - SAME**2) * np.std(x):
+        return 1.0, None
+    if abs(factor - 1.0) > FACTOR:
         return factor, None
-    straight = np.interp(time + late, time, filled) / factor
-    straight -= float(np.mean((straight - rates[0])[good]))
+    straight = (np.interp(time + late, time, filled) - zero) / factor
     own, theirs = lowpass.gains[1:] * np.nan_to_num(noises[0]), lowpass.gains[:2] * noises[1]
-    # So much may the scatter of a stretch exceed the noise by chance, at `_SURE` deviations.
-    samples = 2.0 * lowpass.cutoff * inside.size / lowpass.rate
+    # So much may the scatter of the rows exceed the noise by chance, at `_SURE` deviations.
+    samples = 2.0 * lowpass.cutoff * int(good.sum()) / lowpass.rate
     sure = 1.0 + _SURE * float(np.sqrt(2.0 / max(samples, 1.0)))
-    readings = lowpass.derivatives(straight[longest])
-    differ = [np.mean((readings[k] - rates[k][longest])[inside] ** 2) for k in (0, 1)]
+    readings = lowpass.derivatives(straight, pieces)
+    differ = [np.mean((readings[k] - rates[k])[good] ** 2) for k in (0, 1)]
     both = np.maximum((theirs / factor) ** 2, np.array(differ) - sure * own**2)
     both = np.maximum(both, 1e-300)
     weight = own**2 / (own**2 + both)
     return factor, (straight, weight, np.sqrt(weight * both))
-
-
-def _skew(x: Array, y: Array, dt: float) -> tuple[float, float] | None:
-    """Lag [s] and factor of x(t) = factor * y(t - lag) + offset; None where they are not alike.
-
-    By correlation, refined by least squares on y and its rate; a lag within its error is none.
-    """
-    reach = max(1, min(int(_LONGEST_LAG / dt), x.size // 4))
-    good = np.isfinite(x) & np.isfinite(y)
-    if good.sum() < 50:
-        return None
-    x0, y0 = (np.where(good, z - z[good].mean(), 0.0) for z in (x, y))
-    size = float(np.sqrt((x0**2).sum() * (y0**2).sum()))
-    product = correlate(x0, y0, method="fft")  # at lag k stands k + N - 1
-    product = product[x.size - 1 - reach : x.size + reach]
-    best = int(np.argmax(np.abs(product)))
-    if np.abs(product[best]) < SAME * size or size == 0.0:
-        return None
-    # The peak of a slow signal's correlation is flat: the shift is refined by least squares.
-    t, lag, known = dt * np.arange(x.size), dt * (best - reach), np.where(good, y, np.nan)
-    for _ in range(5):
-        other = np.interp(t - lag, t, known, left=np.nan, right=np.nan)
-        columns = np.stack([other, np.gradient(other, dt), np.ones_like(t)], axis=1)
-        both = good & np.isfinite(columns).all(axis=1)
-        if both.sum() < 50:
-            return None
-        solution = np.linalg.lstsq(columns[both], x[both], rcond=None)[0]
-        factor, fine = float(solution[0]), -float(solution[1] / solution[0])
-        lag = float(np.clip(lag + fine, -dt * reach, dt * reach))
-    rest = x[both] - columns[both] @ solution
-    spread = np.sqrt((rest**2).mean() / max((columns[both, 1] ** 2).sum(), 1e-300))
-    return (lag if abs(lag) > 4.0 * spread / abs(factor) else 0.0), factor
 
 
 def friction_sign(
@@ -196,12 +174,8 @@ def _expected(v: Array, s: Array) -> tuple[Array, Array]:
 
 def _over(x: Array, weights: Array, pieces: Sequence[slice]) -> Array:
     """Sum of a series (N,) over neighbours with weights (odd,), not across gaps."""
-    half = weights.size // 2
-    out = np.empty_like(x)
-    for piece in pieces:
-        whole = oaconvolve(x[piece], weights)
-        out[piece] = np.maximum(whole[half : whole.size - half], 0.0)
-    return out
+    summed = partial(oaconvolve, in2=weights, mode="same")
+    return np.maximum(by_piece(summed, x, pieces), 0.0)
 
 
 def _lengths(flag: Mask) -> Array:
