@@ -16,7 +16,6 @@ from itertools import pairwise
 from typing import Any, Final, Self
 
 import numpy as np
-import pandas as pd
 import scipy  # its signal is loaded where it is first used: every command passes here
 from numpy.typing import NDArray
 
@@ -329,35 +328,6 @@ def pieces_of(lengths: Iterable[int]) -> tuple[slice, ...]:
     """Stretches of so many rows each, one after another."""
     ends = np.cumsum([0, *lengths]).tolist()
     return tuple(slice(a, b) for a, b in pairwise(ends))
-
-
-def most_telling(x: Array, spans: Sequence[slice], count: int) -> list[int]:
-    """Numbers of the stretches of a log that tell most; half of `count` are spread evenly.
-
-    What a stretch tells is the variance of every quantity. A joint that moves in one minute of an
-    hour is thus seen.
-
-    Args:
-        x: Quantities, NaN where they are not known, shape (N, Q).
-        spans: The stretches.
-        count: Most of them.
-    """
-    tells = np.nan_to_num([pd.DataFrame(x[span]).var(ddof=0) for span in spans])
-    score = (tells / np.maximum(tells.mean(axis=0), 1e-300)).sum(axis=1)
-    alive = np.flatnonzero(score > 0)
-    best = alive[np.argsort(-score[alive], kind="stable")[: count // 2]]
-    others = np.setdiff1d(alive, best)
-    places = np.linspace(0, max(others.size - 1, 0), count - best.size).astype(int)
-    return sorted({*best.tolist(), *others[places[: others.size]].tolist()})
-
-
-def cut(pieces: Sequence[slice], rows: int) -> list[slice]:
-    """Pieces in stretches of so many rows; the last ones are shorter."""
-    return [
-        slice(start, min(start + rows, p.stop))
-        for p in pieces
-        for start in range(p.start, p.stop, rows)
-    ]
 
 
 def runs_of(flag: Mask) -> tuple[Rows, Rows]:

@@ -28,9 +28,6 @@ from pipeline.logs.checks import judge, new_values, refuse_repeats
 from pipeline.logs.filters import (
     LARGEST_SHARE,
     LowPass,
-    cut,
-    most_telling,
-    pieces_of,
     rows_of,
 )
 from pipeline.logs.log import (
@@ -120,7 +117,8 @@ class Asked:
     motors: bool = True  #: Whether the machine has motors, by which other channels are compared.
     cutoff: float | None = None  #: Of the low-pass, instead of the one the data ask for [Hz].
     prove_last: float | None = None  #: Share at the end of every log for the test.
-    apart: bool = False  #: Whether many logs stay apart, of which each is told for itself.
+    #: Whether many logs stay apart, and long ones whole: each is told for itself.
+    apart: bool = False
     thinned: bool = True  #: Whether rows beyond what the bandwidth holds are dropped.
     mimics: Mapping[str, str] | None = None  #: Joint to the one that it follows.
     robot: Robot | None = None  #: With legs on the ground, else None.
@@ -174,7 +172,7 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
             f"the logs are compared in different channels ({', '.join(sorted(channels))}); set "
             "effort in a mapping file"
         )
-    short = [*map(_short, read)]
+    short = [shortened(log, *_SHORT) for log in read]
     settings = choose_settings(short, cutoff=asked.cutoff, thinned=asked.thinned)
     if asked.cutoff is None and asked.felt is not None:
         looked = [reduced(log, settings, asked.robot) for log in short]
@@ -187,11 +185,11 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
         ]
         read, fitted = halves[0] + halves[1], len(halves[0])
         tested = {*range(fitted, len(read))}
-    logs = [reduced(log, settings, asked.robot) for log in read]
-    if asked.thinned:
-        share = MOST_ROWS / sum(map(len, logs))
-        logs = [thinned(log, int(share * len(log))) for log in logs]
-    logs = with_rest(logs)
+    if not asked.apart:
+        rows = _STRETCH_ROWS * settings.step
+        share = MOST_ROWS * settings.step / sum(map(len, read))
+        read = [shortened(log, max(1, int(share * len(log) / rows)), rows) for log in read]
+    logs = with_rest([reduced(log, settings, asked.robot) for log in read])
     found += [finding for log in logs for finding in _seen(log, settings)]
     refuse(found)
     logs, guard = split(logs, tested, prove_last=asked.prove_last or 0.0)
@@ -284,15 +282,27 @@ def without_useless(names: Sequence[str], fitted: int, useless: Mapping[int, str
     ]
 
 
-def _short(log: Recording) -> Recording:
-    """What of a long log tells its spectra and noises: where it moves most."""
-    count, rows = _SHORT
+def shortened(log: Recording, count: int, rows: int) -> Recording:
+    """At most `count` stretches of so many rows: those that tell most, half of them spread evenly.
+
+    What a stretch tells is how much every joint moves and works in it: the variances of positions,
+    efforts, and their steps. A joint that moves in one minute of an hour is thus seen.
+    """
     if len(log) <= count * rows:
         return log
-    spans = cut([slice(0, len(log))], rows)
-    kept = [spans[k] for k in most_telling(np.diff(log.position, axis=0), spans, count)]
-    at = np.concatenate([np.arange(span.start, span.stop) for span in kept])
-    return replace(log, frame=log.frame.iloc[at].reset_index(drop=True))
+    names = [column_name(joint, q) for joint in log.joints for q in ("position", log.effort)]
+    table = log.frame[[name for name in names if name in log.frame]]
+    spans = [slice(at, at + rows) for at in range(0, len(log), rows)]
+    own = (table.iloc[span] for span in spans)
+    tells = np.nan_to_num([np.concatenate([x.var(), x.diff().var()]) for x in own])
+    score = (tells / np.maximum(tells.mean(axis=0), 1e-300)).sum(axis=1)
+    alive = np.flatnonzero(score > 0)
+    best = alive[np.argsort(-score[alive], kind="stable")[: count // 2]]
+    others = np.setdiff1d(alive, best)
+    places = np.linspace(0, max(others.size - 1, 0), count - best.size).astype(int)
+    kept = sorted({*best.tolist(), *others[places[: others.size]].tolist()})
+    frame = pd.concat([log.frame.iloc[spans[k]] for k in kept], ignore_index=True)
+    return replace(log, frame=frame)
 
 
 def _naming(settings: Settings, logs: Sequence[Log], felt: Callable[[Log], Array]) -> Settings:
@@ -463,27 +473,3 @@ def _cut(
             if stop - start >= 3:
                 part[piece.start + start : piece.start + stop] = kind
     return part
-
-
-def thinned(log: Log, rows: int) -> Log:
-    """A log with at most so many rows: the stretches that tell most, spread over it.
-
-    What a stretch tells is how much every joint moves and works in it: the variances of position,
-    speed, acceleration and effort.
-    """
-    if len(log) <= rows:
-        return log
-    x = np.concatenate([log.q, log.v, log.a, log.effort[..., 0]], axis=1)
-    x[~log.mask.any(axis=1)] = np.nan
-    spans = cut(log.pieces, _STRETCH_ROWS)
-    kept = [spans[k] for k in most_telling(x, spans, max(1, rows // _STRETCH_ROWS))]
-    pieces = pieces_of(map(rows_of, kept))
-    out = log.at(np.concatenate([np.arange(span.start, span.stop) for span in kept]))
-    assert log.filter is not None
-    assert out.known is not None
-    # What a prediction is filtered from ends with the stretch.
-    inside = np.zeros((len(out), 1), dtype=np.bool_)
-    for piece in pieces:
-        inside[piece.start + log.filter.half : piece.stop - log.filter.half] = True
-    mask, known = out.mask & inside, out.known & inside
-    return replace(out, pieces=pieces, filter=log.filter, mask=mask, known=known)

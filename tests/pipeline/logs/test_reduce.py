@@ -10,7 +10,7 @@ from actuators.arrays import Array
 from actuators.errors import LegwattError
 from pipeline.identification.two_positions import read_off, two_sides
 from pipeline.logs.filters import LowPass, choose_cutoff, smoother_noise
-from pipeline.logs.load import split, thinned
+from pipeline.logs.load import shortened, split
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log, expected_of_robot
 from pipeline.logs.reduce import find_contact
 from tests.pipeline.logs.made import made_log, motion, reduced_log, settings_of
@@ -108,14 +108,13 @@ def test_of_a_long_log_the_stretches_that_tell_most_are_kept():
     t, q, _, _, effort = noisy(60_000)
     q[:, 1] = 0.3
     q[37_000:38_000, 1] += 0.2 * np.sin(3 * t[37_000:38_000])
-    log = reduced_log(made_log(q, effort, RATE))
-    few = thinned(log, 6000)
-    assert 5000 < len(few) <= 6000
-    assert len(thinned(log, 600)) == 1000  # one stretch, of a hundred logs
+    few = shortened(made_log(q, effort, RATE), 6, 1000)
+    assert len(few) == 6000
+    assert len(shortened(few, 1, 1000)) == 1000
     assert ((few.time > 74.2) & (few.time < 75.8)).any()
     assert np.unique((10 * few.time / t[-1]).astype(int)).size >= 4
-    (cut,), _ = split([few])
-    assert {TRAIN, VALIDATION, TEST} <= set(cut.part.tolist())
+    (log,), _ = split([reduced_log(few)])
+    assert {TRAIN, VALIDATION, TEST} <= set(log.part.tolist())
 
 
 def test_what_cannot_be_prepared_is_refused():
