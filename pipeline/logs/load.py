@@ -14,7 +14,7 @@ import hashlib
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import cycle
 from pathlib import Path
 from typing import Final
 
@@ -113,13 +113,13 @@ class Asked:
     expected: Expected  #: The robot's names, limits and ratios.
     mapping: MappingFile | None = None  #: For foreign columns.
     effort: str | None = None  #: Channel to compare, or None for the most direct one.
-    supply: bool = False  #: Whether a log of the supply alone will do.
+    #: Whether a log of the supply alone will do, and no row is dropped.
+    supply: bool = False
     motors: bool = True  #: Whether the machine has motors, by which other channels are compared.
     cutoff: float | None = None  #: Of the low-pass, instead of the one the data ask for [Hz].
     prove_last: float | None = None  #: Share at the end of every log for the test.
     #: Whether many logs stay apart, and long ones whole: each is told for itself.
     apart: bool = False
-    thinned: bool = True  #: Whether rows beyond what the bandwidth holds are dropped.
     mimics: Mapping[str, str] | None = None  #: Joint to the one that it follows.
     robot: Robot | None = None  #: With legs on the ground, else None.
     #: Standard deviation of the prediction from the sensors' noise in the motion, shape (J, C).
@@ -173,7 +173,7 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
             "effort in a mapping file"
         )
     short = [shortened(log, *_SHORT) for log in read]
-    settings = choose_settings(short, cutoff=asked.cutoff, thinned=asked.thinned)
+    settings = choose_settings(short, cutoff=asked.cutoff, thinned=not asked.supply)
     if asked.cutoff is None and asked.felt is not None:
         looked = [reduced(log, settings, asked.robot) for log in short]
         settings = _naming(settings, looked, asked.felt)
@@ -190,7 +190,7 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
         share = MOST_ROWS * settings.step / sum(map(len, read))
         read = [shortened(log, max(1, int(share * len(log) / rows)), rows) for log in read]
     logs = with_rest([reduced(log, settings, asked.robot) for log in read])
-    found += [finding for log in logs for finding in _seen(log, settings)]
+    found += [finding for log in logs for finding in _seen(log)]
     refuse(found)
     logs, guard = split(logs, tested, prove_last=asked.prove_last or 0.0)
     if asked.felt is not None:
@@ -245,13 +245,13 @@ def _refuse_moved(logs: Sequence[Recording], asked: Asked) -> None:
     least = _STILL * np.where(np.isfinite(span), span, 1.0)
     for log in logs if asked.mimics else ():
         travel = np.fmax.reduce(log.position) - np.fmin.reduce(log.position)
-        moved = {log.joints[k] for k in np.flatnonzero(travel > least)}
+        moved = dict(zip(log.joints, travel > least, strict=True))
         for joint, other in (asked.mimics or {}).items():
-            for name in moved & {joint, other}:
+            if moved.get(joint) or moved.get(other):
                 raise LegwattError(
-                    f"{log.name}: '{name}' moves, and '{joint}' mimics '{other}': a drive that "
-                    "moves several joints is not computed; make it fixed in the URDF, or "
-                    "remove <mimic> if it has a drive of its own"
+                    f"{log.name}: '{joint}' mimics '{other}', and they move: a drive that moves "
+                    "several joints is not computed; make it fixed in the URDF, or remove <mimic> "
+                    "if it has a drive of its own"
                 )
 
 
@@ -360,7 +360,7 @@ def with_rest(logs: Sequence[Log]) -> list[Log]:
     return out
 
 
-def _seen(log: Log, settings: Settings) -> list[Finding]:
+def _seen(log: Log) -> list[Finding]:
     """What is told of one reduced log."""
     found, read = Findings(log.name), log.recording
     assert read is not None
@@ -368,9 +368,9 @@ def _seen(log: Log, settings: Settings) -> list[Finding]:
     j, rate = step_rate(log)
     if rate < min(log.bandwidth, LEAST_CUTOFF) and read.column(log.joints[j], "velocity") is None:
         detail = (
-            f"takes {rate:.3g} new values a second: a velocity and acceleration up to "
-            f"{LEAST_CUTOFF:g} Hz, as a robot's motion needs, show the steps alone; log positions "
-            "with more digits, or the velocity beside them"
+            f"takes {rate:.3g} new values a second: velocity and acceleration up to "
+            f"{LEAST_CUTOFF:g} Hz would show the steps alone; log positions with more digits, or "
+            "the velocity beside them"
         )
         column = column_name(log.joints[j], read.position_quantity(log.joints[j]))
         found.note(column, "resolution", rate, "Hz", "refused", detail)
@@ -414,26 +414,32 @@ def split(
     Raises:
         LegwattError: Too little data for three parts.
     """
-    guard = LowPass(logs[0].rate, logs[0].bandwidth).noise_memory
+    guard, rate = LowPass(logs[0].rate, logs[0].bandwidth).noise_memory, logs[0].rate
     pattern = PATTERN_WITHOUT_TEST if tested or prove_last else PATTERN
     # Pieces of which guards between the fewest blocks would take much are dealt out as they are, in
     # the pattern's order over all logs.
-    least = (1 + BLOCK_GUARDS) * FEWEST_BLOCKS * guard * logs[0].rate
-    every = [
-        (k, n) for k, one in enumerate(logs) for n in range(len(one.pieces)) if k not in tested
+    least = (1 + BLOCK_GUARDS) * FEWEST_BLOCKS * guard * rate
+    short = [
+        [p for p in log.pieces if rows_of(p) < least and k not in tested]
+        for k, log in enumerate(logs)
     ]
-    short = [(k, n) for k, n in every if rows_of(logs[k].pieces[n]) < least]
-    turns = {place: turn for turn, place in enumerate(short) if len(short) >= len(pattern)}
+    turns = cycle(pattern) if sum(map(len, short)) >= len(pattern) else None
     out = []
-    for k, one in enumerate(logs):
-        own, share = ((TEST,), 0.0) if k in tested else (pattern, prove_last)
-        dealt = {n: turn for (log, n), turn in turns.items() if log == k}
-        out.append(replace(one, part=_cut(one, guard, own, share, dealt)))
-    rows = [sum(int((one.part == k).sum()) for one in out) for k in range(len(NAMES))]
+    for k, (log, whole) in enumerate(zip(logs, short, strict=True)):
+        part = np.full(len(log), TEST if k in tested else UNUSED, dtype=np.int8)
+        proving = whole[len(whole) - round(prove_last * len(whole)) :]
+        for piece in log.pieces if k not in tested else ():
+            if turns is not None and piece in whole:
+                part[piece] = TEST if piece in proving else next(turns)
+            else:
+                margin = int(np.ceil(guard * rate))
+                part[piece] = _blocks(rows_of(piece), margin, pattern, prove_last)
+        out.append(replace(log, part=part))
+    rows = [sum(int((log.part == k).sum()) for log in out) for k in range(len(NAMES))]
     if min(rows) < _LEAST_ROWS:
-        duration = sum(float(one.time[-1] - one.time[0]) for one in logs)
+        duration = sum(float(log.time[-1] - log.time[0]) for log in logs)
         raise LegwattError(
-            f"{logs[0].name}: {duration:.3g} s in {sum(len(o.pieces) for o in logs)} "
+            f"{logs[0].name}: {duration:.3g} s in {sum(len(log.pieces) for log in logs)} "
             f"pieces without a gap, at a cut-off of {logs[0].bandwidth:.3g} Hz with guards of "
             f"{guard:.2g} s between parts, leave {min(rows)} rows to "
             f"{NAMES[int(np.argmin(rows))]}; log longer, or raise the cut-off"
@@ -441,35 +447,19 @@ def split(
     return out, guard
 
 
-def _cut(
-    one: Log, guard: float, pattern: Sequence[int], last: float, turns: Mapping[int, int]
-) -> NDArray[np.int8]:
-    """Parts of one log, with a guard wherever neighbours belong to different parts.
+def _blocks(size: int, margin: int, pattern: Sequence[int], last: float) -> NDArray[np.int8]:
+    """Parts of the rows of one piece, (size,): blocks by turns, the last share for the test.
 
-    Pieces in `turns` go to one part each, by their place in the pattern, the last share of them to
-    the test.
+    A guard of `margin` rows stands wherever neighbours belong to different parts, taken from the
+    one that is not the test.
     """
-    part = np.full(len(one), UNUSED, dtype=np.int8)
-    margin = int(np.ceil(guard * one.rate))
-    proving = [*turns][len(turns) - round(last * len(turns)) :]
-    for k, piece in enumerate(one.pieces):
-        size = rows_of(piece)
-        fitted = size - round(last * size)
-        if k in turns:
-            spans = [(TEST if k in proving else pattern[turns[k] % len(pattern)], 0, size)]
-        else:
-            blocks = int(fitted / ((1 + BLOCK_GUARDS) * margin))
-            blocks = min(MOST_BLOCKS, max(blocks, FEWEST_BLOCKS))
-            edges = np.round(np.linspace(0, fitted, blocks + 1)).astype(int).tolist()
-            ends = enumerate(pairwise(edges))
-            spans = [(pattern[b % len(pattern)], start, stop) for b, (start, stop) in ends]
-            spans += [(TEST, fitted, size)] if last else []
-        for b, (kind, start, stop) in enumerate(spans):
-            # Between two parts the guard is taken from the one that is not the test.
-            if b > 0 and spans[b - 1][0] == TEST != kind:
-                start += margin
-            if b + 1 < len(spans) and spans[b + 1][0] != kind != TEST:
-                stop -= margin
-            if stop - start >= 3:
-                part[piece.start + start : piece.start + stop] = kind
-    return part
+    fitted = size - round(last * size)
+    count = int(np.clip(fitted / ((1 + BLOCK_GUARDS) * margin), FEWEST_BLOCKS, MOST_BLOCKS))
+    edges = np.round(np.linspace(0, fitted, count + 1)).astype(int)
+    lengths = [*np.diff(edges), size - fitted]
+    part = np.repeat([*np.resize(pattern, count), TEST], lengths).astype(np.int8)
+    out = part.copy()
+    for k in (np.flatnonzero(np.diff(part)) + 1).tolist():
+        own = slice(k, k + margin) if part[k - 1] == TEST else slice(max(k - margin, 0), k)
+        out[own] = UNUSED
+    return out

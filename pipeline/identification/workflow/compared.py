@@ -211,7 +211,6 @@ def load_logs(given: Machine, options: Order) -> Logs:
         cutoff=options.cutoff,
         prove_last=options.prove_last,
         apart=options.step in ("power", "forward"),
-        thinned=options.step != "power",
         mimics=given.mimics,
         robot=robot,
         # By the machine as its files say: what a model file adds changes no bandwidth.
