@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy.ndimage import median_filter, percentile_filter
 
 from actuators.arrays import Array, Mask
@@ -56,6 +57,8 @@ _CHANGES, _ROWS = 12.0, 6.0
 _CHANCE: Final = 1e-6
 #: Rows that hold one value are looked at from this many on.
 _LEAST_RUN: Final = 20
+#: Share of the shorter log's moving rows from which two logs count as the same data.
+_SHARE: Final = 0.02
 #: What positions beyond the limits of a joint may be.
 _DEGREES: Final = (
     "looks like degrees, or a motor's angle; in a mapping file: "
@@ -246,17 +249,28 @@ def _feet_carry(log: Recording, weight: float | None, found: Findings) -> None:
 
 
 def refuse_repeats(logs: Sequence[Recording]) -> None:
-    """Refuse a log that is given twice.
+    """Refuse logs that hold the same rows, in whole or in part.
 
     Raises:
-        LegwattError: Names both.
+        LegwattError: Names two that do.
     """
-    for one, other in combinations(logs, 2):
-        if one.sha256 == other.sha256:
+    rows = [(log.name, _moving_rows(log)) for log in logs if len(logs) > 1]
+    for (one, a), (other, b) in combinations(rows, 2):
+        same = np.intersect1d(a, b, assume_unique=True).size
+        if same > _SHARE * min(a.size, b.size):
             raise LegwattError(
-                f"{one.name} and {other.name} are the same file: test data must be data of their "
-                "own, and data given twice count twice; leave one out"
+                f"{one} and {other} hold the same measurements ({same} rows): test data must be "
+                "data of their own, and data given twice count twice; leave one out"
             )
+
+
+def _moving_rows(log: Recording) -> NDArray[np.uint64]:
+    """A number for every three rows in which something changes; the same for equal ones."""
+    names = [column_name(joint, q) for joint in log.joints for q in ("position", log.effort)]
+    table = log.frame[[name for name in names if name in log.frame]].dropna(how="all", axis=1)
+    own = np.asarray(pd.util.hash_pandas_object(table.dropna(), index=False), dtype=np.uint64)
+    both = own[2:] + np.uint64(3) * own[1:-1] + np.uint64(7) * own[:-2]  # wraps, as hashes do
+    return np.unique(both[(own[2:] != own[1:-1]) & (own[1:-1] != own[:-2])])
 
 
 def own_spacing(time: Array) -> float:

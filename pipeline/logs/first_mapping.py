@@ -38,16 +38,13 @@ _WORDS: Final = {
     "goal": "goal target cmd command commanded desired des d ref reference setpoint sp",
     "no measurement": "enabled enable status error mode on off raw flag",
     "motor": "motor rotor",
-    "supply": "supply battery bus bat rail pack psu vbat vbus",
     "empty": "joint joints state states actual act measured meas present axis servo robot data leg "
     "motor rotor",
 }
 _KEYWORD: Final = {word: name for name, text in _QUANTITIES.items() for word in text.split()}
 _SAYS: Final = {role: {*text.split()} for role, text in _WORDS.items()}
-#: Owners of columns: the supply of all drives, and no joint that the robot has.
-SUPPLY, NOBODY = "supply", "JOINT"
-#: Quantities of a supply, by those of a joint.
-_OF_SUPPLY: Final = {"voltage": "supply", "current": "supply_current", "power": "supply_power"}
+#: Owner of a column that is of no joint that the robot has.
+NOBODY: Final = "JOINT"
 #: What a unit tells where no word does.
 _OF_UNIT: Final = {
     **{"angle": "position", "angular velocity": "velocity"},
@@ -139,11 +136,11 @@ def first_mapping(path: Path, expected: Expected) -> FirstMapping:
     positions = {g.owner: g for g in guesses if g.quantity in _POSITIONS}
     for g in sorted(guesses, key=lambda g: g.quantity not in _POSITIONS):
         _tell_unit(g, data[g.column], positions.get(g.owner), expected)
-    taken, targets = {*own}, [g.target for g in guesses]
+    taken = {*own}
     for g in guesses:
         if g.owner == NOBODY:
             g.sure, g.why = False, "no joint with a position is called so: put its name"
-        elif g.target in taken or (g.owner == SUPPLY and targets.count(g.target) > 1):
+        elif g.target in taken:
             g.sure, g.why = False, f"{g.why}; another column gives the same"
         taken |= {g.target} if g.sure else set()
     text = [_HEAD.format(where=table.where, by=by), *text]
@@ -183,13 +180,12 @@ def _clock(data: Mapping[str, Array], own: Collection[str]) -> tuple[str, list[s
 
 def _name_owners(guesses: Sequence[Guess], joints: Sequence[str]) -> str:
     """Give columns the robot's names of their joints, or `NOBODY`; by what those were known."""
-    of_joints = [g for g in guesses if g.owner != SUPPLY]
-    names = {q: dict.fromkeys(g.owner for g in of_joints if g.quantity == q) for q in UNITS}
+    names = {q: dict.fromkeys(g.owner for g in guesses if g.quantity == q) for q in UNITS}
     known = [*(names["position"] | names["motor_position"])]
     told, by = assign(known, joints)
     # Joints that other quantities call otherwise than positions do: `enc 1`, `motor 1 A`.
     called = {q: assign([*own], known)[0] if {*own} - {*known} else {} for q, own in names.items()}
-    for g in of_joints:
+    for g in guesses:
         g.owner = told.get(called[g.quantity].get(g.owner, g.owner), NOBODY)
     return by
 
@@ -199,27 +195,21 @@ def _tell_unit(g: Guess, x: Array, position: Guess | None, expected: Expected) -
     if g.unit or g.owner == NOBODY:
         return
     low, high = float(np.nanmin(x)), float(np.nanmax(x))
-    span = f"from {low:.4g} to {high:.4g}"
-    if g.quantity.endswith("current"):
+    if g.quantity == "current":
         g.unit = "mA" if max(-low, high) > _AMPERES else ""
     elif position is not None and g.quantity in ("goal_position", "velocity"):
         g.unit = position.unit + "/s" * (g.quantity == "velocity" and position.unit == "deg")
-    elif g.quantity == "motor_position":
-        g.why = f"{span}; named of a motor"
     elif g.quantity == "position":
         k = expected.joints.index(g.owner)
         least, most = float(expected.lower[k]), float(expected.upper[k])
         margin = _BEYOND * (most - least)
         limits = (least - margin, most + margin) if np.isfinite(margin) else (-_TURNS, _TURNS)
         fits = [u for u, f in _ANGLES.items() if limits[0] <= f * low and f * high <= limits[1]]
-        g.sure, g.unit = bool(fits), "" if "rad" in fits else "deg" if fits else "rad"
-        g.why = f"{span}, as far as the joint's limits or a turn allow"
-        if not fits:
-            g.why = f"{span}: no radians, no degrees; a motor's, or counts?"
-        elif "rad" not in fits:
-            g.why += "; else a motor's angle"
-        elif "deg" in fits and high - low > np.pi:
-            g.why += "; else in degrees"
+        g.sure, g.unit = bool(fits), fits[0] if fits else "rad"
+        g.unit *= g.unit != "rad" or not fits
+        g.why = f"from {low:.4g} to {high:.4g}: "
+        g.why += f"{' or '.join(fits)} by the joint's limits" if fits else "no radians, no degrees"
+        g.why += "; or a motor's angle" * ("rad" not in fits)
 
 
 def words_of(name: str) -> list[str]:
@@ -271,10 +261,6 @@ def _read(column: str, text: str, unit: str, by_unit: bool) -> Guess:
         quantity = ""
     elif goal:
         quantity = "goal_position" if quantity in ("", "position") else ""
-    elif _SAYS["supply"] & {*words}:
-        volts = {"vbat", "vbus"} & {*words} or (unit and dimension(unit) == "voltage")
-        quantity = _OF_SUPPLY.get(quantity, "supply" if volts else "")
-        owner = SUPPLY
     elif _SAYS["motor"] & {*words} and quantity == "position":
         quantity = "motor_position"
     if quantity and unit and dimension(UNITS[quantity]) != dimension(unit):

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -116,11 +117,16 @@ def test_each_threshold_has_two_sides(two_joints, check):
         assert said == ({verdict} if verdict else set()), number
 
 
-def test_a_log_given_twice_is_refused():
-    logs = [made_log(*good(seed=1)[::2], facts={"sha256": x}) for x in "abc"]
-    refuse_repeats(logs)
-    with pytest.raises(LegwattError, match="the same file"):
-        refuse_repeats([*logs, logs[0]])
+@pytest.mark.parametrize(("shared", "same"), [(60, False), (100, True)])
+def test_logs_that_share_a_fiftieth_are_the_same(shared, same):
+    logs = []
+    for seed in (1, 2):
+        q, _, e = good(4000, seed)
+        q[-400:], e[-400:] = 0.1, 0.2  # both end at rest
+        q[:shared], e[:shared] = (x[:shared] for x in good(4000, 3)[::2])
+        logs.append(made_log(q, e))
+    with pytest.raises(LegwattError, match="the same measurements") if same else nullcontext():
+        refuse_repeats(logs)
 
 
 SILENT = [

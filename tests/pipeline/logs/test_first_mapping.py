@@ -66,26 +66,6 @@ def test_a_disguised_log_is_read_as_what_it_is(disguise, columns, write, two_joi
         assert np.allclose(velocity[:, j], columns[f"{joint}__velocity_rad_s"], atol=1e-9)
 
 
-def test_a_meter_of_the_supply_counts_unless_there_are_several(
-    columns, write, two_joints, tmp_path
-):
-    joints = {"t": columns["time_s"], "q_a": columns["a__position_rad"]}
-    joints["q_b"] = columns["b__position_rad"]
-    meter = {"bus_voltage": np.full(2000, 24.0), "bus_current": np.linspace(900.0, 1100.0, 2000)}
-    path = write(joints | meter, "foreign.csv")
-    (tmp_path / "first.toml").write_text(first_mapping(path, two_joints).text, encoding="utf-8")
-    log = read_log(path, two_joints, load_mapping(tmp_path / "first.toml"))
-    assert log.supply_alone
-    voltage, current = log.of("supply"), log.of("supply_current")
-    assert voltage is not None
-    assert current is not None
-    assert np.allclose(voltage, 24.0)
-    assert np.allclose(current, np.linspace(0.9, 1.1, 2000))
-    twice = {f"bus_current_{k}": meter["bus_current"] for k in range(2)}
-    made = first_mapping(write(joints | twice, "two.csv"), two_joints)
-    assert made.open == ("bus_current_0", "bus_current_1")
-
-
 def test_joints_are_told_by_name_or_by_order_and_never_shifted():
     joints = ("arm_joint_1", "arm_joint_2", "arm_joint_3")
     assert assign(["2", "1", "3"], joints)[0]["2"] == "arm_joint_2"
