@@ -84,7 +84,7 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], Recording]
     found, frame = Findings(log.name), dict[str, Array]()
     found += log.findings
     few, detail = len(log) < FEWEST_ROWS, f"{len(log)} rows; at least {FEWEST_ROWS} are needed"
-    found.note("", "rows", len(log), "1", "refused" if few else "ok", detail)
+    found.note("", "rows", "refused" if few else "ok", detail, len(log))
     if few:
         return found, log
     _rate(log, found)
@@ -95,7 +95,7 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], Recording]
         column = column_name(joint, log.position_quantity(joint))
         if not np.isfinite(q).any():
             detail = f"holds no number at all, and its {log.effort} does: where did it move?"
-            found.note(column, "empty", 1, "1", "refused", detail)
+            found.note(column, "empty", "refused", detail)
             continue
         moving, own = ~standstill(q), column_name(joint, log.effort)
         frame[column_name(joint, "position")] = _good(log.time, q, moving, column, "rad", found)
@@ -107,20 +107,20 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], Recording]
         if off is not None and off[:, j].any():
             bridge = log.torque_off_bridge or "not stated (open or shorted?)"
             detail = f"{int(off[:, j].sum())} rows with the drive off; bridge {bridge}"
-            found.note(own, "torque_off", float(off[:, j].mean()), "1", "masked", detail)
+            found.note(own, "torque_off", "masked", detail, float(off[:, j].mean()))
             frame[own] = np.where(off[:, j], np.nan, frame[own])
     good = replace(log, frame=log.frame.assign(**frame))
     if all(is_constant(log.position_of(joint)) for joint in log.joints):
-        found.note("", "constant", 1, "1", "refused", "no joint moves; nothing can be compared")
+        found.note("", "constant", "refused", "no joint moves; nothing can be compared")
     elif silent == len(log.joints) and not log.supply_alone:
         detail = f"no joint that moves has a live {log.effort}; nothing can be compared"
-        found.note("", "empty", 1, "1", "refused", detail)
+        found.note("", "empty", "refused", detail)
     _limits(good, expected, found)
     _feet_carry(log, expected.weight, found)
     if log.ignored:
-        found.note("", "ignored_columns", len(log.ignored), "1", "ok", ", ".join(log.ignored))
+        found.note("", "ignored_columns", "ok", ", ".join(log.ignored), len(log.ignored))
     for channel, formula in log.derived.items():
-        found.note("", "derived", 1, "1", "ok", f"{channel} computed as {formula}")
+        found.note("", "derived", "ok", f"{channel} computed as {formula}")
     return found, good
 
 
@@ -131,13 +131,13 @@ def _rate(log: Recording, found: Findings) -> None:
     rate, inside, slow = 1.0 / dt, step <= GAP * dt, 1.0 / dt < SLOWEST
     detail = f"{rate:.5g} Hz over {log.time[-1] - log.time[0]:.4g} s"
     detail += "; time_s is no time in seconds? give its unit in a mapping file" * slow
-    found.note("time_s", "rate", rate, "Hz", "refused" if slow else "ok", detail)
+    found.note("time_s", "rate", "refused" if slow else "ok", detail, rate, "Hz")
     jitter = float(np.std(step[inside]))
     if jitter > _UNEVEN * dt:
-        found.note("time_s", "jitter", jitter, "s", "warning", "resampled by interpolation")
+        found.note("time_s", "jitter", "warning", "resampled by interpolation", jitter, "s")
     if gaps := int((~inside).sum()):
         detail = f"{gaps} gaps, the longest {step.max():.4g} s; filtered piece by piece"
-        found.note("time_s", "gaps", gaps, "1", "masked", detail)
+        found.note("time_s", "gaps", "masked", detail, gaps)
 
 
 def _good(time: Array, x: Array, moving: Mask, column: str, unit: str, found: Findings) -> Array:
@@ -145,7 +145,7 @@ def _good(time: Array, x: Array, moving: Mask, column: str, unit: str, found: Fi
     good = np.isfinite(x)
     missing = int((~good).sum())
     if 0 < missing < x.size:
-        found.note(column, "missing", missing / x.size, "1", "masked", f"{missing} empty cells")
+        found.note(column, "missing", "masked", f"{missing} empty cells", missing / x.size)
     if is_constant(x):
         return x
     step = quantum(x)
@@ -160,7 +160,7 @@ def _good(time: Array, x: Array, moving: Mask, column: str, unit: str, found: Fi
         first, verdict = int(np.argmax(odd)), "warning" if passes else check.verdict
         detail = f"{int(odd.sum())} rows {check.detail}; the first, at {time[first]:.6g} s, is "
         detail += f"{x[first]:.5g} {unit}"
-        found.note(column, check.name, float(odd.mean()), "1", verdict, detail)
+        found.note(column, check.name, verdict, detail, float(odd.mean()))
         if not passes:
             good &= ~odd
     return np.where(good, x, np.nan)
@@ -186,7 +186,7 @@ def _silent(log: Recording, joint: str, q: Array, x: Array, found: Findings) -> 
         why = f"is nothing but {seen} while the joint moves: a dead sensor; the joint is left out"
     else:
         return False
-    found.note(column_name(joint, quantity), check, 1, "1", verdict, why)
+    found.note(column_name(joint, quantity), check, verdict, why)
     return silent
 
 
@@ -211,7 +211,7 @@ def _limits(log: Recording, expected: Expected, found: Findings) -> None:
         away = outside > 0.5 and max(low - q.max(), q.min() - high) > TURNS
         detail += _DEGREES if degrees else f"{100 * outside:.1f} % of the rows lie {_OUTSIDE}"
         verdict = "suspected" if degrees or away else "warning"
-        found.note(column, "share_outside_limits", outside, "1", verdict, detail)
+        found.note(column, "share_outside_limits", verdict, detail, outside)
     largest = {"torque": expected.effort_limit, **expected.largest}
     for channel in (c for c in log.channels if c in largest):
         for joint, limit in zip(log.joints, largest[channel], strict=True):
@@ -220,7 +220,7 @@ def _limits(log: Recording, expected: Expected, found: Findings) -> None:
             if top > _TOO_STRONG * limit:
                 detail = f"reaches {top:.4g}, the drive's limit is {limit:.4g}: another unit (give "
                 detail += "it in a mapping file), or the log of another robot"
-                found.note(column_name(joint, channel), "magnitude", top, "1", "suspected", detail)
+                found.note(column_name(joint, channel), "magnitude", "suspected", detail, top)
 
 
 def _feet_carry(log: Recording, weight: float | None, found: Findings) -> None:
@@ -234,7 +234,7 @@ def _feet_carry(log: Recording, weight: float | None, found: Findings) -> None:
     absent = [f"force_{axis}" for k, axis in enumerate("xy") if np.isnan(force[..., k]).all()]
     if absent:
         detail = f"no {' and no '.join(absent)}: what is not measured is unknown"
-        found.note("", "foot_forces", len(log.feet), "1", "warning", detail)
+        found.note("", "foot_forces", "warning", detail, len(log.feet))
     if not weight:
         return
     share, why = float(np.mean(np.nansum(force[..., 2], axis=1))) / weight, ""
@@ -245,7 +245,7 @@ def _feet_carry(log: Recording, weight: float | None, found: Findings) -> None:
     elif abs(share - 1.0) > _WEIGHT:
         why = ": a foot that tells nothing, a load that the model lacks, or it hangs or leans"
     detail = f"on average the feet carry {share:.3g} of the robot's weight of {weight:.4g} N{why}"
-    found.note("", "feet_carry", share, "1", "warning" if why else "ok", detail)
+    found.note("", "feet_carry", "warning" if why else "ok", detail, share)
 
 
 def refuse_repeats(logs: Sequence[Recording]) -> None:

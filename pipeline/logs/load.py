@@ -373,7 +373,7 @@ def _seen(log: Log) -> list[Finding]:
             "the velocity beside them"
         )
         column = column_name(log.joints[j], read.position_quantity(log.joints[j]))
-        found.note(column, "resolution", rate, "Hz", "refused", detail)
+        found.note(column, "resolution", "refused", detail, rate, "Hz")
     return found
 
 

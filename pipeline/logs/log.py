@@ -145,7 +145,7 @@ class Findings(list[Finding]):
         self._log = log
 
     def note(
-        self, column: str, check: str, value: float, unit: str, verdict: str, detail: str
+        self, column: str, check: str, verdict: str, detail: str, value: float = 1, unit: str = "1"
     ) -> None:
         """Add one."""
         self.append(Finding(self._log, column, check, float(value), unit, verdict, detail))

@@ -223,12 +223,12 @@ def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> 
     wanted = [*(column for column, _ in plan.sources.values()), *mapping.torque_enabled.values()]
     data = plan.source.columns([*dict.fromkeys(wanted)])
     if plan.source.remark:
-        found.note("", "file", 1, "1", "warning", plan.source.remark)
+        found.note("", "file", "warning", plan.source.remark)
     frame = _in_si(plan, data)
     fresh = _fresh(frame[TIME], plan.source.where)
     if many := int((~fresh).sum()):
         text = f"{many} rows with the time of the row before were dropped"
-        found.note("time_s", "repeated_times", many, "1", "warning", text)
+        found.note("time_s", "repeated_times", "warning", text, many)
         data, frame = ({name: x[fresh] for name, x in old.items()} for old in (data, frame))
     feet, unused = _feet(frame, expected.feet)
     ratio = np.full(len(expected.joints), np.nan) if expected.ratio is None else expected.ratio
@@ -318,7 +318,7 @@ def _sides(frame: Columns, plan: ReadingPlan, ratios: Array, found: Findings) ->
         seen = _slope(motor, here) if _live(here) else None
         if seen is not None and not abs(seen / ratio - 1.0) <= _CONTRADICTS:
             detail = f"gear ratio {seen:.6g} by the two positions, {ratio:.6g} by the files"
-            found.note(column, "side", seen, "1", "warning", detail)
+            found.note(column, "side", "warning", detail, seen)
             ratio = seen
         elif np.isnan(ratio):
             raise LegwattError(
@@ -385,7 +385,7 @@ def _drive(
             torque = gains.torque(joint, logged, frame[TIME])
             off = frame.get(f"{joint}__{OFF}", False)
             frame[column_name(joint, "torque")] = np.where(off, 0.0, torque)
-        found.note("", "file", 1, "1", "warning", f"the torque {CANNOT}")
+        found.note("", "file", "warning", f"the torque {CANNOT}")
     if plan.supply_alone:
         derived["torque"] = BY_MODEL
         none = np.full(frame[TIME].size, np.nan)

@@ -304,7 +304,7 @@ class _Reduction:
                 detail = f"is {factor:.3g} times the rate of the position and has no say; if its "
                 detail += "unit or sign is another one, say so in the mapping"
                 name = column_name(joint, "velocity")
-                self.found.note(name, "rate", factor, "1", "warning", detail)
+                self.found.note(name, "rate", "warning", detail, factor)
             if own is not None:
                 straight, weights, rate_noise = own
                 first, second, _ = lowpass.derivatives(straight, pieces)
@@ -347,7 +347,7 @@ class _Reduction:
             return {}
         stands = self.contact.standing[self.grid.nearest]
         detail = f"which feet stand is known by {self.contact.source}"
-        self.found.note("", "contact", 1, "1", "ok", detail)
+        self.found.note("", "contact", "ok", detail)
         out: dict[str, Any] = {"standing": stands[self.rows]}
         measured, force = self.log.foot_force, self.smooth(self.log.foot_force)
         if force is None or measured is None:
@@ -431,5 +431,5 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
     if off is not None:
         takers[DRIVE_OFF] = off if idle is None else off & ~idle
     out, found = out.without(takers), on.found
-    found.note("", "cutoff", out.bandwidth, "Hz", "ok", settings.reason)
+    found.note("", "cutoff", "ok", settings.reason, out.bandwidth, "Hz")
     return replace(out, known=out.mask, findings=tuple(found))
