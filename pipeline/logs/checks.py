@@ -105,9 +105,6 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], Recording]
             continue
         frame[own] = _good(log.time, x, moving, own, log.unit, found)
         if off is not None and off[:, j].any():
-            bridge = log.torque_off_bridge or "not stated (open or shorted?)"
-            detail = f"{int(off[:, j].sum())} rows with the drive off; bridge {bridge}"
-            found.note(own, "torque_off", "masked", detail, float(off[:, j].mean()))
             frame[own] = np.where(off[:, j], np.nan, frame[own])
     good = replace(log, frame=log.frame.assign(**frame))
     if all(is_constant(log.position_of(joint)) for joint in log.joints):
@@ -169,25 +166,23 @@ def _good(time: Array, x: Array, moving: Mask, column: str, unit: str, found: Fi
 def _silent(log: Recording, joint: str, q: Array, x: Array, found: Findings) -> bool:
     """Whether a joint's effort says nothing, and why."""
     still, values = is_constant(q), np.unique(x[np.isfinite(x)])
-    seen = f"{', '.join(f'{v:.6g}' for v in values[:_FEW_VALUES])} {log.unit}"
-    verdict, quantity, silent = "warning", log.effort, True
+    place = column_name(joint, log.position_quantity(joint))
     if joint in log.left_out:
-        check, why, quantity = "left_out", log.left_out[joint], log.position_quantity(joint)
-    elif values.size == 0:
-        check, why = "empty", "holds no number at all: the joint is left out"
+        found.note(place, "left_out", "warning", log.left_out[joint])
     elif still and values.size == 1:
-        check, verdict, quantity = "constant", "masked", log.position_quantity(joint)
         why = "position and effort never change: the joint is left out"
-    elif still:
-        check, silent, quantity = "still", False, log.position_quantity(joint)
+        found.note(place, "constant", "masked", why)
+    elif still and values.size:
         why = f"never changes while its {log.effort} does: it stood still, or its sensor is dead"
+        found.note(place, "still", "warning", why)
+        return False
     elif values.size <= _FEW_VALUES:
-        check = "constant"
+        seen = ", ".join(f"{v:.6g}" for v in values) or "empty cells"
         why = f"is nothing but {seen} while the joint moves: a dead sensor; the joint is left out"
+        found.note(column_name(joint, log.effort), "constant", "warning", why)
     else:
         return False
-    found.note(column_name(joint, quantity), check, verdict, why)
-    return silent
+    return True
 
 
 def _limits(log: Recording, expected: Expected, found: Findings) -> None:
@@ -231,10 +226,6 @@ def _feet_carry(log: Recording, weight: float | None, found: Findings) -> None:
     force = log.foot_force
     if force is None:
         return
-    absent = [f"force_{axis}" for k, axis in enumerate("xy") if np.isnan(force[..., k]).all()]
-    if absent:
-        detail = f"no {' and no '.join(absent)}: what is not measured is unknown"
-        found.note("", "foot_forces", "warning", detail, len(log.feet))
     if not weight:
         return
     share, why = float(np.mean(np.nansum(force[..., 2], axis=1))) / weight, ""

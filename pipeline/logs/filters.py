@@ -37,10 +37,6 @@ MOVED: Final = 0.01
 REMEMBERED: Final = 0.05
 #: Median absolute deviation of a normal distribution per standard deviation.
 _MAD: Final = 0.6744897501960817
-#: Samples of a kernel up to which summing is quicker than transforming.
-_SHORT: Final = 64
-#: Rows that are filtered at once: what the transforms need of memory.
-_BLOCK: Final = 1 << 18
 WHOLE: Final = (slice(None),)
 Rows = NDArray[np.intp]
 #: A step this many times the usual one is a gap; the filter never runs across it.
@@ -113,31 +109,29 @@ class LowPass:
         """
         return self._apply(x, pieces, self.kernels[:1])[0]
 
-    def first(self, x: Array, pieces: Sequence[slice] = WHOLE) -> Array:
-        """Low-passed first derivative of the shape of `x`."""
-        return self._apply(x, pieces, self.kernels[1:2])[0]
-
     def derivatives(self, x: Array, pieces: Sequence[slice] = WHOLE) -> tuple[Array, Array, Array]:
         """Low-passed value, first and second derivative, each of the shape of `x`."""
         value, first, second = self._apply(x, pieces, self.kernels)
         return value, first, second
 
     def noises(self, x: Array, pieces: Sequence[slice] = WHOLE) -> tuple[Array, Array, Array]:
-        """Noise of value, first and second derivative, each of the shape of `x` (samples,).
+        """Noise of value, first and second derivative, each of the shape of `x` (samples first).
 
         Half the difference of what even and odd rows alone give: another draw of the noise that
         passes, as large where it is large, if samples err independently of one another.
         """
         rest = x - self.smooth(x, pieces)
-        return self.derivatives(rest * np.resize([1.0, -1.0], x.size), pieces)
+        rest[1::2] *= -1.0
+        return self.derivatives(rest, pieces)
 
     def share(self, flag: Mask, pieces: Sequence[slice] = WHOLE) -> Array:
-        """Share of the kernel's weight on flagged samples (N,) or beyond the ends, 0 to 1."""
+        """Share of the kernel's weight on flagged samples (N, C) or beyond the ends, 0 to 1."""
         weight = np.abs(self.kernels[0])[:, None]
 
         def seen(own: Mask) -> Array:
-            whole = np.pad(own.astype(np.float64), self.half, constant_values=1.0)
-            return _summed(whole[:, None], weight / weight.sum())[:, 0]
+            ends = (self.half, self.half), (0, 0)
+            whole = np.pad(own.astype(np.float64), ends, constant_values=1.0)
+            return _summed(whole, weight / weight.sum())
 
         return np.clip(by_piece(seen, flag, pieces), 0.0, 1.0)
 
@@ -159,14 +153,7 @@ def by_piece(function: Callable[[Any], Any], x: Any, pieces: Sequence[slice]) ->
 
 def _summed(x: Array, kernel: Array) -> Array:
     """Sums of a series (N, C) over a kernel (K, 1) where it lies inside."""
-    reach = kernel.size - 1
-    if kernel.size <= _SHORT:
-        out = scipy.ndimage.convolve1d(x, kernel[:, 0], axis=0, mode="constant")
-        return np.asarray(out[reach // 2 : len(x) - reach // 2])
-    parts = [x[at : at + _BLOCK + reach] for at in range(0, len(x) - reach, _BLOCK)]
-    return np.concatenate(
-        [scipy.signal.oaconvolve(part, kernel, mode="valid", axes=0) for part in parts]
-    )
+    return np.asarray(scipy.signal.oaconvolve(x, kernel, mode="valid", axes=0))
 
 
 def _extended(x: Array, half: int) -> Array:
@@ -292,9 +279,12 @@ class Grid:
         return cls(whole, pieces_of(map(len, parts)), np.where(nearer, right, right - 1))
 
     def bridged(self, time: Array, x: Array) -> Array:
-        """Values (N,) of the log's rows, straight between those that are none; else zeros."""
-        ok = np.isfinite(x)
-        return np.interp(self.time, time[ok], x[ok]) if ok.any() else np.zeros(self.time.size)
+        """Columns (N, C) of the log's rows on the grid, straight over holes; zeros for none."""
+        out = np.zeros((self.time.size, x.shape[1]))
+        for j, ok in enumerate(np.isfinite(x).T):
+            if ok.any():
+                out[:, j] = np.interp(self.time, time[ok], x[ok, j])
+        return out
 
     def missing(self, time: Array, ok: Mask, longest: float) -> Mask:
         """Grid times (M,) between good rows (N,) that are further apart than `longest` [s].

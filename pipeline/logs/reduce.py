@@ -6,7 +6,7 @@ same zero-phase low-pass; then rows that say nothing more are dropped.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final, NamedTuple
@@ -179,11 +179,10 @@ def choose_settings(
     asked, moved = [], []
     for log in logs:
         grid = Grid.under(log.time, dt, bridge=1.0 / (4.0 * held))
-        parts = [piece for piece in grid.pieces if rows_of(piece) >= 64]
-        raw = [_position(log, j, grid) for j in range(len(log.joints))] if parts else []
-        stretches = [np.stack([q[part] for q in raw], axis=1) for part in parts]
+        raw = grid.bridged(log.time, log.position)
+        stretches = [raw[piece] for piece in grid.pieces if rows_of(piece) >= 64]
         if stretches:
-            step = np.array([quantum(log.position_of(joint)) for joint in log.joints])
+            step = np.array([quantum(q) for q in log.position.T])
             cutoffs, reach = choose_cutoff(stretches, rate, smallest=smallest, step=step)
             asked.append(cutoffs)
             moved.append(reach / FLAT)
@@ -224,26 +223,18 @@ def _held(log: Recording) -> float:
     return OWN_SHARE / slowest if slowest > 1.9 * float(np.median(np.diff(own))) else np.inf
 
 
-def _position(log: Recording, j: int, grid: Grid) -> Array:
-    """Positions of joint `j` on the grid, bad ones bridged, shape (M,) [rad]."""
-    return grid.bridged(log.time, log.position_of(log.joints[j]))
-
-
-class _Reduction:
-    """A log on its way to a grid and a bandwidth, joint by joint: what one takes is free again."""
+class _OnGrid:
+    """A log on a uniform grid, and the filter that it passes."""
 
     def __init__(self, log: Recording, settings: Settings, robot: Robot | None) -> None:
         self.log, self.settings, self.lowpass = log, settings, settings.lowpass
-        self.found = Findings(log.name)
         self.grid = Grid.under(log.time, settings.dt, bridge=settings.bridged)
-        kept = [np.arange(p.start, p.stop, settings.step) for p in self.grid.pieces]
-        self.rows, self.pieces = np.concatenate(kept), pieces_of(map(len, kept))
+        self.pieces = self.grid.pieces
         self.contact = find_contact(log, robot)
         rate, cutoff = self.lowpass.rate, settings.cutoff
         self.above = LowPass(rate, max(settings.cutoff, settings.least))
         self.wide = LowPass(rate, min(WIDER * cutoff, LARGEST_SHARE * rate))
         self.calm = self._calm()
-        self.clear = self.lowpass.share(np.zeros(self.calm.size, np.bool_), self.grid.pieces)
 
     def _calm(self) -> Mask:
         """Rows (N,) of the grid by which noise is told: no filter there sees a change of stance.
@@ -253,118 +244,101 @@ class _Reduction:
         """
         calm: Mask = np.ones(self.grid.time.size, dtype=np.bool_)
         if self.contact is not None:
-            change = changes(self.contact.standing[self.grid.nearest], self.grid.pieces)
-            near = within(change, self.grid.pieces, 2 * self.above.half)
+            change = changes(self.contact.standing[self.grid.nearest], self.pieces)
+            near = within(change, self.pieces, 2 * self.above.half)
             calm = ~np.asarray(near.any(axis=1))
         return calm if calm.mean() > _CALM else np.ones_like(calm)
 
-    def on_grid(self, x: Array) -> tuple[Array, Mask, Mask]:
-        """Values, short holes bridged; where they are missing; where the filter sees enough."""
-        missing = self.grid.missing(self.log.time, np.isfinite(x), self.settings.bridged)
-        hidden = self.lowpass.share(missing, self.grid.pieces) if missing.any() else self.clear
-        return self.grid.bridged(self.log.time, x), missing, hidden <= TOLERATED_SHARE
+    def values(self, x: Array) -> tuple[Array, Mask, Mask]:
+        """Columns (N, C), short holes bridged; what is missing; where the filter sees enough."""
+        longest = self.settings.bridged
+        missing = [self.grid.missing(self.log.time, ok, longest) for ok in np.isfinite(x).T]
+        none = np.stack(missing, axis=1)
+        enough = self.lowpass.share(none, self.pieces) <= TOLERATED_SHARE
+        return self.grid.bridged(self.log.time, x), none, enough
 
-    def white(self, x: Array, ok: Mask) -> float:
-        """Noise of a sample of a series (N,) on the grid."""
-        good = (ok & self.calm)[:, None]
-        return float(smoother_noise(x[:, None], good, self.grid.pieces, self.above)[0])
+    def noise(self, x: Array, ok: Mask) -> Array:
+        """Standard deviation of a sample of columns (N, C) on the grid, (C,); NaN: too few."""
+        return smoother_noise(x, ok & self.calm[:, None], self.pieces, self.above)
 
     def smooth(self, x: Array | None) -> Array | None:
         """Columns (N, ...) of what acts on the prediction and shares its bandwidth."""
         if x is None:
             return None
-        on = [self.grid.bridged(self.log.time, c) for c in x.reshape(len(self.log), -1).T]
-        out = self.lowpass.smooth(np.stack(on, axis=1), self.grid.pieces)
-        return out[self.rows].reshape(-1, *x.shape[1:])
+        on = self.grid.bridged(self.log.time, x.reshape(len(self.log), -1))
+        return self.lowpass.smooth(on, self.pieces).reshape(-1, *x.shape[1:])
 
-    def of_joints(self, one: Callable[[int], dict[str, Any]]) -> dict[str, Any]:
-        """What every joint has, joints last; NaN for those that lack what others have."""
-        every, none = [*map(one, range(len(self.log.joints)))], np.full(self.rows.size, np.nan)
-        names = dict.fromkeys(name for own in every for name in own)
-        return {n: np.stack([own.get(n, none) for own in every], axis=-1) for n in names}
-
-    def motion(self, j: int) -> dict[str, Any]:
-        """Of one joint what becomes a column of a `Log`'s motion."""
-        log, lowpass, pieces = self.log, self.lowpass, self.grid.pieces
-        joint, position = log.joints[j], log.position_of(log.joints[j])
-        raw, _, seen = self.on_grid(position)
+    def motion(self, found: Findings) -> dict[str, Any]:
+        """Series (N, J) of a `Log`'s motion, and its `rate_noise`."""
+        log, lowpass, pieces = self.log, self.lowpass, self.pieces
+        raw, _, seen = self.values(log.position)
         value, speed, rate = lowpass.derivatives(raw, pieces)
-        other, scatter = lowpass.noises(raw, pieces)[2], self.white(raw, seen)
-        coarse = max(np.nan_to_num(scatter), quantum(position) / np.sqrt(12.0))
-        rate_noise = lowpass.gains[1:] * np.nan_to_num(scatter)
-        speed_noise, measured = coarse * lowpass.gains[1], log.column(joint, "velocity")
-        if measured is not None and np.isfinite(measured).any():
-            column, _, told = self.on_grid(measured)
-            noises = scatter, self.white(column, told)
-            column = np.where(told, column, np.nan)
-            factor, own = weigh(
-                self.grid.time, column, (speed, rate), seen, noises, lowpass, pieces
-            )
-            if abs(factor - 1.0) > FACTOR:
-                detail = f"is {factor:.3g} times the rate of the position and has no say; if its "
-                detail += "unit or sign is another one, say so in the mapping"
-                name = column_name(joint, "velocity")
-                self.found.note(name, "rate", "warning", detail, factor)
-            if own is not None:
-                straight, weights, rate_noise = own
-                first, second, _ = lowpass.derivatives(straight, pieces)
-                speed_noise, rates = (
-                    rate_noise[0],
-                    (first, second, lowpass.noises(straight, pieces)[1]),
+        scatter, other = self.noise(raw, seen), lowpass.noises(raw, pieces)[2]
+        steps = np.array([quantum(q) for q in log.position.T])
+        coarse = np.maximum(np.nan_to_num(scatter), steps / np.sqrt(12.0))
+        rate_noise = np.outer(lowpass.gains[1:], np.nan_to_num(scatter))
+        speed_noise = coarse * lowpass.gains[1]
+        if (measured := log.of("velocity")) is not None:
+            column, _, told = self.values(measured)
+            noises = np.stack([scatter, self.noise(column, told)])
+            column[~told] = np.nan
+            for j in np.flatnonzero(told.any(axis=0)).tolist():
+                rates = speed[:, j], rate[:, j]
+                factor, own = weigh(
+                    self.grid.time, column[:, j], rates, seen[:, j], noises[:, j], lowpass, pieces
                 )
-                shares = [np.where(told, weights[k], 0.0) for k in (0, 1, 1)]
-                for mine, theirs, share in zip((speed, rate, other), rates, shares, strict=True):
-                    mine += share * (theirs - mine)
+                if abs(factor - 1.0) > FACTOR:
+                    detail = f"is {factor:.3g} times the rate of the position and has no say; if "
+                    detail += "its unit or sign is another one, say so in the mapping"
+                    name = column_name(log.joints[j], "velocity")
+                    found.note(name, "rate", "warning", detail, factor)
+                if own is not None:
+                    straight, weights, rate_noise[:, j] = own
+                    speed_noise[j] = rate_noise[0, j]
+                    first, second, _ = lowpass.derivatives(straight, pieces)
+                    theirs = first, second, lowpass.noises(straight, pieces)[1]
+                    shares = [np.where(told[:, j], weights[k], 0.0) for k in (0, 1, 1)]
+                    for x, y, share in zip((speed, rate, other), theirs, shares, strict=True):
+                        x[:, j] += share * (y - x[:, j])
         # The sign of the speed: at a wider band rows that the filter mixes are told apart.
-        fast, wider = self.wide.first(raw, pieces), coarse * self.wide.gains[1]
-        mean, unsure = friction_sign(speed, speed_noise, fast, wider, pieces, lowpass)
+        fast, wider = self.wide.derivatives(raw, pieces)[1], coarse * self.wide.gains[1]
+        signs = [
+            friction_sign(v, s, w, sw, pieces, lowpass)
+            for v, s, w, sw in zip(speed.T, speed_noise, fast.T, wider, strict=True)
+        ]
+        sign, unsure = (np.stack(x, axis=1) for x in zip(*signs, strict=True))
         # Rows that are left out have a say in those that stay.
-        near = partial(uniform_filter1d, size=2 * (self.settings.step // 2) + 1, mode="nearest")
-        series = {"q": value, "v": speed, "a": rate, "a_noise": other, "moved": seen}
-        series |= {"sign": by_piece(near, mean, pieces), "unsure": unsure}
-        motor = None if log.at_motor else log.column(joint, "motor_position")
-        if motor is not None and np.isfinite(motor).mean() >= 0.5:
-            ahead, _, told = self.on_grid(motor)
-            series["windup"] = np.where(told, lowpass.smooth(ahead, pieces) - value, np.nan)
-        return {n: x[self.rows] for n, x in series.items()} | {"rate_noise": rate_noise}
+        size = 2 * (self.settings.step // 2) + 1
+        near = partial(uniform_filter1d, size=size, axis=0, mode="nearest")
+        out = {"q": value, "v": speed, "a": rate, "a_noise": other, "moved": seen}
+        out |= {"sign": by_piece(near, sign, pieces), "unsure": unsure}
+        motor = None if log.at_motor else log.of("motor_position")
+        if motor is not None:
+            ahead, _, told = self.values(motor)
+            known = told & (np.isfinite(motor).mean(axis=0) >= 0.5)
+            out["windup"] = np.where(known, lowpass.smooth(ahead, pieces) - value, np.nan)
+        return out | {"rate_noise": rate_noise}
 
-    def effort(self, channel: str, j: int) -> dict[str, Any]:
-        """Of one channel and joint values, noise, and where the filter sees enough."""
-        x, rows = self.log.column(self.log.joints[j], channel), self.rows
-        x = np.full(len(self.log), np.nan) if x is None else x
-        on, missing, enough = self.on_grid(x)
-        smooth = np.where(missing, np.nan, self.lowpass.smooth(on, self.grid.pieces))
-        noise = self.white(on, enough) * self.lowpass.gains[0]
-        raw = on if np.isfinite(x).any() else np.full(on.size, np.nan)
-        return {"effort": smooth[rows], "raw": raw[rows], "noise": noise, "felt": enough[rows]}
-
-    def feet(self) -> dict[str, Any]:
+    def feet(self, found: Findings) -> dict[str, Any]:
         """Which feet stand, their forces [N], and the noise of a component of one.
 
         Sensors of feet in the air show noise alone, or nothing at all.
         """
         if self.contact is None:
             return {}
+        found.note("", "contact", "ok", f"which feet stand is known by {self.contact.source}")
         stands = self.contact.standing[self.grid.nearest]
-        detail = f"which feet stand is known by {self.contact.source}"
-        self.found.note("", "contact", "ok", detail)
-        out: dict[str, Any] = {"standing": stands[self.rows]}
         measured, force = self.log.foot_force, self.smooth(self.log.foot_force)
         if force is None or measured is None:
-            return out
+            return {"standing": stands}
         # A component that no column gives is NaN from end to end.
-        absent = np.isnan(measured).all(axis=0)
-        standing = out["standing"][..., None]
-        out["foot_force"] = np.where(standing, np.where(absent, np.nan, force), 0.0)
-        each = measured.reshape(len(self.log), -1).T
-        good = np.repeat(stands, 3, axis=1).T
-        noise = [
-            self.white(self.grid.bridged(self.log.time, x), stood)
-            for x, stood in zip(each, good, strict=True)
-        ]
-        shaking = [x for x in noise if x > 0.0]
-        out["foot_noise"] = float(np.median(shaking)) * self.lowpass.gains[0] if shaking else None
-        return out
+        force = np.where(np.isnan(measured).all(axis=0), np.nan, force)
+        each = self.grid.bridged(self.log.time, measured.reshape(len(self.log), -1))
+        noise = self.noise(each, np.repeat(stands, 3, axis=1))
+        shaking = noise[noise > 0.0]
+        own = float(np.median(shaking)) * self.lowpass.gains[0] if shaking.size else None
+        force = np.where(stands[..., None], force, 0.0)
+        return {"standing": stands, "foot_force": force, "foot_noise": own}
 
 
 def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> Log:
@@ -375,61 +349,63 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
         settings: From `choose_settings`.
         robot: Whose feet stand; None for a fixed base.
     """
-    on = _Reduction(log, settings, robot)
-    rows, idle, off = on.rows, None, log.torque_off
+    on, found = _OnGrid(log, settings, robot), Findings(log.name)
     channels: tuple[str, ...] = (log.effort,)
     if log.effort == "current" and log.of("voltage") is not None:
         channels = ("current", "voltage")
-    motion = on.of_joints(on.motion)
-    every = [on.of_joints(partial(on.effort, channel)) for channel in channels]
-    effort, noise = (np.stack([x[n] for x in every], axis=-1) for n in ("effort", "noise"))
-    felt: Mask = every[0]["felt"]
+    each = [log.efforts, *(x for c in channels[1:] if (x := log.of(c)) is not None)]
+    values = [on.values(x) for x in each]
+    smooth = [np.where(none, np.nan, on.lowpass.smooth(x, on.pieces)) for x, none, _ in values]
+    effort, (raw, _, felt) = np.stack(smooth, axis=-1), values[0]
+    noise = np.stack([on.noise(x, enough) for x, _, enough in values], axis=1)
+    noise *= on.lowpass.gains[0]
     # A joint without enough good samples has no floor of its own; it is masked anyway.
     usual = [np.nanmedian(x) if np.isfinite(x).any() else 1.0 for x in noise.T]
+    off, idle = log.torque_off, None
     if off is not None:
         off = off[on.grid.nearest]
         if log.torque_off_bridge == "open" and channels[0] != "torque" and len(channels) == 1:
             # No current flows: where the filter sees nothing else the effort is zero, and the
             # motion alone says what friction and inertia are.
-            shares = [on.lowpass.share(~x, on.grid.pieces)[rows] for x in off.T]
-            idle = np.stack(shares, axis=1) <= 1e-9
+            idle = on.lowpass.share(~off, on.pieces) <= 1e-9
             effort[idle] = 0.0
             felt |= idle
-        off = off[rows]
     felt &= np.isfinite(effort).all(axis=2)
-    turning = [log.of(f"base_angular_velocity_{axis}") for axis in "xyz"]
-    told = [x for x in turning if x is not None]
-    motion |= {x: on.smooth(log.of(x)) for x in ("base_roll", "base_pitch", "base_yaw")}
+    turning = [x for a in "xyz" if (x := log.of(f"base_angular_velocity_{a}")) is not None]
     warm = log.of("temperature")
     if warm is not None:  # known of every joint or of none
-        each = [on.grid.bridged(log.time, x) for x in warm.T]
-        warm = np.stack(each, axis=1)[rows] if np.isfinite(warm).all() else None
-    out = Log(
+        warm = on.grid.bridged(log.time, warm) if np.isfinite(warm).all() else None
+    series: dict[str, Any] = on.motion(found) | (on.feet(found) if robot is not None else {})
+    series |= {x: on.smooth(log.of(x)) for x in ("base_roll", "base_pitch", "base_yaw")}
+    series |= {
+        "time": on.grid.time,
+        "effort": np.nan_to_num(effort),
+        "raw": np.where(np.isfinite(log.efforts).any(axis=0), raw, np.nan),
+        "mask": np.ones(felt.shape, dtype=np.bool_),
+        "part": np.full(felt.shape[0], UNUSED, dtype=np.int8),
+        "base_rate": on.smooth(np.stack(turning, axis=1)) if len(turning) == 3 else None,
+        "open_winding": None if idle is None else off,
+        "temperature": warm,
+        "off": off,
+    }
+    found.note("", "cutoff", "ok", settings.reason, settings.cutoff, "Hz")
+    whole = Log(
         name=log.name,
-        time=on.grid.time[rows],
         joints=log.joints,
         channels=channels,
-        effort=np.nan_to_num(effort),
         noise=np.where(np.isfinite(noise), noise, usual),
-        mask=np.ones(felt.shape, dtype=np.bool_),
-        part=np.full(rows.size, UNUSED, dtype=np.int8),
         pieces=on.pieces,
-        filter=LowPass(1.0 / (settings.dt * settings.step), settings.cutoff),
         bandwidth=settings.cutoff,
         at_motor=log.at_motor,
-        base_rate=on.smooth(np.stack(told, axis=1)) if len(told) == 3 else None,
-        open_winding=None if idle is None else off,
-        temperature=warm,
         sha256=log.sha256,
-        off=off,
-        raw=every[0]["raw"],
+        findings=tuple(found),
         recording=log,
-        **motion,
-        **(on.feet() if robot is not None else {}),
+        **series,
     )
-    takers: dict[str, Mask] = {NO_MOTION: ~motion["moved"].all(axis=1)[:, None], NO_EFFORT: ~felt}
+    takers: dict[str, Mask] = {NO_MOTION: ~series["moved"].all(axis=1)[:, None], NO_EFFORT: ~felt}
     if off is not None:
         takers[DRIVE_OFF] = off if idle is None else off & ~idle
-    out, found = out.without(takers), on.found
-    found.note("", "cutoff", "ok", settings.reason, out.bandwidth, "Hz")
-    return replace(out, known=out.mask, findings=tuple(found))
+    kept = [np.arange(p.start, p.stop, settings.step) for p in on.pieces]
+    out = whole.without(takers).at(np.concatenate(kept))
+    filtered = LowPass(1.0 / (settings.dt * settings.step), settings.cutoff)
+    return replace(out, known=out.mask, pieces=pieces_of(map(len, kept)), filter=filtered)

@@ -73,7 +73,7 @@ def weigh(
     column: Array,
     rates: tuple[Array, Array],
     ok: Mask,
-    noises: tuple[float, float],
+    noises: Array,
     lowpass: LowPass,
     pieces: Sequence[slice],
 ) -> tuple[float, tuple[Array, Array, Array] | None]:
@@ -84,7 +84,7 @@ def weigh(
         column: As measured, shape (N,) [rad/s]; NaN where it was not.
         rates: First and second derivative of the filtered position, each (N,).
         ok: Where the position's rate is good, shape (N,).
-        noises: Standard deviation of a sample of position [rad] and of velocity [rad/s].
+        noises: Standard deviation of a sample of position [rad] and of velocity [rad/s], (2,).
         lowpass: The filter.
         pieces: Stretches without a gap.
 
@@ -97,7 +97,7 @@ def weigh(
     if not np.isfinite(noises[1]) or good.mean() < 0.5:
         return 1.0, None
     filled, late = np.interp(time, time[good], column[good]), 0.0
-    good = lowpass.share(~good, pieces) < _WHOLE
+    good = lowpass.share(~good[:, None], pieces)[:, 0] < _WHOLE
     if not good.any():
         return 1.0, None
     columns = np.stack([*rates, np.ones_like(time)], axis=1)[good]

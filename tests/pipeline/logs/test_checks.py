@@ -131,7 +131,7 @@ def test_logs_that_share_a_fiftieth_are_the_same(shared, same):
 
 SILENT = [
     (lambda q, e: e[:, :1].fill(1.5), "a__torque_Nm", "constant", 0.0),
-    (lambda q, e: e[:, :1].fill(np.nan), "a__torque_Nm", "empty", 0.0),
+    (lambda q, e: e[:, :1].fill(np.nan), "a__torque_Nm", "constant", 0.0),
     (lambda q, e: np.rint(np.tanh(e[:, 0]), out=e[:, 0]), "a__torque_Nm", "constant", 0.0),
     (lambda q, e: e[500:900, :1].fill(1.5), "a__torque_Nm", "frozen", 0.9),
     (lambda q, e: q[:, :1].fill(0.3), "a__position_rad", "still", 1.0),

@@ -94,7 +94,7 @@ def estimate(log: Moved, how: str) -> Array:
     inside = np.zeros(n, dtype=np.bool_)
     inside[narrow.half : -narrow.half] = True
     q, v, a = narrow.derivatives(log.q)
-    y, fast = narrow.smooth(log.torque), wide.first(log.q)
+    y, fast = narrow.smooth(log.torque), wide.derivatives(log.q)[1]
     white = np.std(np.diff(log.q, 4)[np.abs(np.diff(log.q, 4)) > 0]) / np.sqrt(70.0)
     noise, wider = (float(white * band.gains[1]) for band in (narrow, wide))
     unsure = np.zeros(n)
