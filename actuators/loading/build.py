@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Final, NamedTuple, Self
+from typing import Annotated, Any, Final, Self
 
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, Strict, model_validator
@@ -101,30 +101,26 @@ WINDING: Final = "winding"  # the motor's row among the losses
 _RATIO_TOLERANCE: Final = 1e-9  # relative
 
 
-class _Written(Table):
-    kind: Text
-    title: str
-    note: str = ""
-    parameters: dict[str, object]
-
-
-class Component(NamedTuple):
+class Component(Table):
     """One component file of the catalogue."""
 
-    name: str  #: The file's stem.
-    kind: str  #: What it is; a `dc_motor` drives a chain.
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+    name: str = Field(default="", exclude=True)  #: The file's stem.
+    kind: Text  #: What it is; a `dc_motor` drives a chain.
     title: str  #: The same in words.
+    note: str = ""
     parameters: ParameterSet
 
 
 def _component(path: Path) -> Component:
-    file = one_line(path.name)
-    written = checked(_Written, read_toml(path), file)
-    # What is needed, alternatives say: they name each number, and one that none names is refused.
-    motor = written.kind == MOTOR_KIND
-    numbers, optional = (MOTOR, {"mass"}) if motor else (NUMBERS, {*NUMBERS})
-    parameters = parameters_from_table(written.parameters, numbers, file, frozenset(optional))
-    return Component(path.stem, written.kind, written.title, parameters)
+    file, table = one_line(path.name), read_toml(path)
+    if "parameters" in table:
+        # What is needed, alternatives say: they name each number; one that none names is refused.
+        motor = table.get("kind") == MOTOR_KIND
+        numbers, optional = (MOTOR, {"mass"}) if motor else (NUMBERS, {*NUMBERS})
+        own = parameters_from_table(table["parameters"], numbers, file, frozenset(optional))
+        table["parameters"] = own
+    return checked(Component, table, file).model_copy(update={"name": path.stem})
 
 
 @dataclass(frozen=True)
@@ -146,9 +142,8 @@ class Catalog:
     def replaced(self, reference: str, value: float, **changes: Any) -> "Catalog":
         """Return a catalogue with another SI value; see `ParameterSet.replaced`."""
         component, name = self._split(reference)
-        edited = component._replace(
-            parameters=component.parameters.replaced(name, value, **changes)
-        )
+        parameters = component.parameters.replaced(name, value, **changes)
+        edited = component.model_copy(update={"parameters": parameters})
         return replace(self, components={**self.components, component.name: edited})
 
     def chain(self, name: str, values: Mapping[str, Scalars] | None = None) -> Chain:

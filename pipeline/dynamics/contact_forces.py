@@ -19,7 +19,7 @@ from actuators.arrays import Array, Mask
 from actuators.errors import StanceError
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Segment, level_ground
-from pipeline.motion.walking import burdens, stability_margins
+from pipeline.motion.walking import stability_margins
 from pipeline.robot.kinematics import LegChains, leg_posture
 from pipeline.robot.robot import Robot
 
@@ -345,7 +345,7 @@ def refuse_falling(
         if segment.foot_target is None:
             words += "; check which feet stand, or shift the body towards them"
         else:
-            words += f"; {burdens(robot)}spread the feet, shorten the stroke, walk slower"
+            words += "; spread the feet, lessen slope or load, shorten the stroke, walk slower"
             sways = segment.time.size == 1 or gait_of(robot.spec).margin is not None
             words += "" if sways else ', let the body sway (gait.sway = "least")'
         raise StanceError(

@@ -42,30 +42,24 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Size:
-    """The size that a number has in practice, one standard deviation before a log is seen."""
-
-    value: float  #: In `of`, or in the number's unit where that is empty.
-    of: str  #: What it is a share of, e.g. ``torque/speed``: root mean squares at the joint.
-
-    def at(self, scales: Values) -> float:
-        """In the number's unit, with the scales of the joint and robot by name."""
-        over, _, under = self.of.partition("/")
-        speed, _, power = under.partition("^")
-        size = self.value * (scales[over] if over else 1.0)
-        return size / scales[speed] ** int(power or 1) if speed else size
-
-
-@dataclass(frozen=True)
 class Coordinate:
     """A number in which an effect is fitted; at zero the effect is not there."""
 
     name: str  #: Of the coordinate.
     step: float  #: For finite differences; small against what matters.
-    size: Size | None = None  #: In practice.
     signed: bool = False  #: Whether negative values make sense.
     #: Whether the effect is this effect only while this coordinate is not zero.
     required: bool = True
+    #: In practice, one standard deviation before a log is seen, as a share of `of`; 0 for none.
+    size: float = 0.0
+    of: str = ""  #: Such as ``torque/speed``: root mean squares at the joint; empty for its unit.
+
+    def sized(self, scales: Values) -> float:
+        """Its size in practice, with the scales of the joint and robot by name."""
+        over, _, under = self.of.partition("/")
+        speed, _, power = under.partition("^")
+        size = self.size * (scales[over] if over else 1.0)
+        return size / scales[speed] ** int(power or 1) if speed else size
 
 
 class Form(NamedTuple):
@@ -273,9 +267,9 @@ def _parameter(row: Mapping[str, str]) -> Parameter:
 def _coordinate(row: Mapping[str, str]) -> Coordinate:
     form = FORMS.get(row["told_by"])
     signed = form.signed if form else not row["unit"] or float(row["low"]) < 0.0
-    size = Size(float(row["size"]), row["of"])
     step, required = float(row["step"]), "spare" not in row["role"]
-    return Coordinate(_fitted_name(row), step, size, signed, required)
+    size = float(row["size"]), row["of"]
+    return Coordinate(_fitted_name(row), step, signed, required, *size)
 
 
 def enter() -> None:

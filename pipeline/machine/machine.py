@@ -10,7 +10,7 @@ tau = C^T sigma: a motor that also turns with another joint carries a part of th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, lru_cache
@@ -145,37 +145,37 @@ def drivetrains_of(chain: Chain, names: Sequence[str]) -> Drivetrains:
 
 def _merged(joint: ShaftSeries, parts: Sequence[tuple[list[int], ChainResult]]) -> ChainResult:
     """The results of some columns each as one result of all columns."""
+    results = [result for _, result in parts]
 
-    def whole(value: Callable[[ChainResult], Array | None]) -> Array:
+    def whole(values: Iterable[Array | None]) -> Array:
         out = np.zeros(joint.torque.shape)
-        for columns, result in parts:
-            own = value(result)
+        for (columns, _), own in zip(parts, values, strict=True):
             if own is not None:
                 out[:, columns] = own
         return out
 
-    def shaft(side: Callable[[ChainResult], ShaftSeries]) -> ShaftSeries:
-        columns = {n: whole(lambda r, n=n: getattr(side(r), n)) for n in BY_JOINT}  # type: ignore[misc]
+    def shaft(sides: Sequence[ShaftSeries]) -> ShaftSeries:
+        columns = {name: whole([getattr(side, name) for side in sides]) for name in BY_JOINT}
         return ShaftSeries(joints=joint.joints, time=joint.time, **columns)
 
-    def by_element(rows: Callable[[ChainResult], Mapping[str, Array]]) -> dict[str, Array]:
-        names = dict.fromkeys(name for _, result in parts for name in rows(result))
-        return {n: whole(lambda r, n=n: rows(r).get(n)) for n in names}  # type: ignore[misc]
+    def by_element(rows: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+        names = dict.fromkeys(name for own in rows for name in own)
+        return {name: whole([own.get(name) for own in rows]) for name in names}
 
-    first = parts[0][1]
-    *inner, motor = first.shafts
+    *inner, motor = results[0].shafts
     # Shafts that all of them have, and the motors' whatever they are called.
-    shared = [stage for stage in inner if all(stage in result.shafts for _, result in parts)]
-    losses, copper = by_element(lambda r: r.losses), [*first.losses][-1]
+    shared = [stage for stage in inner if all(stage in r.shafts for r in results)]
+    shafts = {stage: shaft([r.shafts[stage] for r in results]) for stage in shared}
+    losses, copper = by_element([r.losses for r in results]), [*results[0].losses][-1]
+    losses[copper] = losses.pop(copper)  # stays the last
     motors = {k: m for columns, r in parts for k, m in zip(columns, r.motors, strict=True)}
     return ChainResult(
-        {stage: shaft(lambda r, s=stage: r.shafts[s]) for stage in shared}  # type: ignore[misc]
-        | {motor: shaft(lambda r: r.motor)},
-        {**{n: loss for n, loss in losses.items() if n != copper}, copper: losses[copper]},
-        by_element(lambda r: r.stored),
-        whole(lambda r: r.current),
-        whole(lambda r: r.voltage),
-        whole(lambda r: r.electrical_power),
+        {**shafts, motor: shaft([r.motor for r in results])},
+        losses,
+        by_element([r.stored for r in results]),
+        whole([r.current for r in results]),
+        whole([r.voltage for r in results]),
+        whole([r.electrical_power for r in results]),
         motors=tuple(motors[k] for k in range(len(motors))),
     )
 

@@ -18,12 +18,12 @@ import numpy as np
 from pydantic import Field, Strict
 
 from actuators.chain import Chain
-from actuators.checked import Names, Table, Text, checked
+from actuators.checked import Names, Table, Text, checked, read_toml
 from actuators.errors import LegwattError, known, one_line
 from actuators.loading.build import Catalog
 from actuators.parameters import Parameter, dimension, parameters_from_table
 from pipeline.machine.machine import Drivetrains, drivetrains_of
-from pipeline.robot.robot_file import KNOWN_SCHEME, RobotSpec, known_folder
+from pipeline.robot.robot_file import KNOWN, KNOWN_SCHEME, TABLE, RobotSpec
 
 #: The alternative of a machine whose joints are built as different ones.
 AS_BUILT: Final = "as_built"
@@ -77,7 +77,8 @@ def actuator_folder(spec: RobotSpec) -> Path | None:
     if folder is None:
         return None
     if folder.startswith(KNOWN_SCHEME):
-        return known_folder(folder, f"{spec.path}: actuators.folder")
+        robots, name = read_toml(TABLE), folder.removeprefix(KNOWN_SCHEME)
+        return KNOWN / known("no known robot", name, robots, f"{spec.path}: actuators.folder")
     path = spec.path.parent / folder
     if not path.is_dir():
         raise LegwattError(f"{spec.path}: actuators.folder: no folder '{one_line(path)}'")

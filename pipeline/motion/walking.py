@@ -195,7 +195,7 @@ def least_sway(robot: Robot, gait: Gait, posture: Array, walked: Callable[[Sway]
                 raise LegwattError(
                     f"{gait.source}: no sway of the body keeps the {gait.title} from tipping with "
                     f"a margin of {1e3 * margin:.1f} mm, about {1e3 * most:.1f} mm is attainable: "
-                    f"lower gait.stability_margin; {burdens(robot)}raise gait.duty_factor or "
+                    "lower gait.stability_margin, lessen slope or load, raise gait.duty_factor or "
                     "gait.period, or shorten the stroke"
                 )
             margin = most / 2
@@ -254,14 +254,6 @@ def _attainable(matrix: Array, bound: Array) -> float:
     goal = np.append(np.zeros(matrix.shape[1]), -1.0)
     best = linprog(goal, A_ub=rows, b_ub=-bound, bounds=(-10, 10), method="highs").x
     return 0.0 if best is None else float(best[-1])
-
-
-def burdens(robot: Robot) -> str:
-    """What of ``[gait]`` moves the centre of mass off the feet, as a remedy; empty without."""
-    table = gait_table(robot.spec)
-    keys = ("slope_forward", "slope_left", "payload_mass", "body_x", "body_y")
-    stated = [f"gait.{key}" for key in keys if getattr(table, key)]
-    return f"lessen {', '.join(stated)}; or " if stated else ""
 
 
 DEFAULT_SAMPLES: Final = 751  # per half period: one every 2 ms at the paper's period

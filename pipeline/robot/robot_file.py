@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, Strict, model_validator
 
@@ -104,27 +104,14 @@ def known_motors(names: Sequence[str], joints: Sequence[str]) -> Mapping[str, An
     return None
 
 
-def known_folder(folder: str, where: str) -> Path:
-    """The folder of actuator files that ``known:NAME`` means; refused where there is none."""
-    name = folder.removeprefix(KNOWN_SCHEME)
-    robots = sorted(path.name for path in KNOWN.iterdir() if path.is_dir())
-    return KNOWN / known("no known robot", name, robots, where)
-
-
-class Bounds(NamedTuple):
-    """What a number of a robot file may be, its ends included [SI]."""
-
-    dimension: str
-    low: float
-    high: float
+#: Dimension of a number of a robot file, and what it may be, its ends included [SI].
+Bounds = tuple[str, float, float]
 
 
 def _numbers(of: str) -> dict[str, Bounds]:
     with Path(__file__).with_name("numbers.csv").open(encoding="utf-8", newline="") as file:
         rows = [row for row in csv.reader(file) if row[-1] == of]
-    return {
-        name: Bounds(kind, float(low), float(high or "inf")) for name, kind, low, high, _ in rows
-    }
+    return {name: (kind, float(low), float(high or "inf")) for name, kind, low, high, _ in rows}
 
 
 #: Numbers every walking robot needs. Lengths of walking robots lie within a millimetre and 10 m:
@@ -135,7 +122,7 @@ GAIT_SCHEMA: Final = _numbers("gait")
 #: Numbers from which `pipeline.robot.urdf` builds the hexapod and the leg on a stand.
 BUILD_SCHEMA: Final = _numbers("build")
 PERIODS: Final = GAIT_SCHEMA["gait_period"][1:]  # of a walk [s]
-FASTEST: Final = GAIT_SCHEMA["walking_speed"].high  # [m/s]
+FASTEST: Final = GAIT_SCHEMA["walking_speed"][2]  # [m/s]
 #: A gait's numbers among the parameters; ``[gait]`` may state its own instead.
 GAIT_NUMBERS: Final = frozenset({"foot_stroke", "foot_lift", "walking_speed", "gait_period"})
 
@@ -351,7 +338,7 @@ def spec_of(table: dict[str, Any], sources: tuple[Path, ...], path: Path) -> Rob
         numbers = GAIT_SCHEMA | BUILD_SCHEMA if built else GAIT_SCHEMA
         table["parameters"] = parameters_from_table(
             table["parameters"],
-            {name: bounds.dimension for name, bounds in numbers.items()},
+            {name: kind for name, (kind, *_) in numbers.items()},
             f"{where}: parameters",
             optional=GAIT_NUMBERS,  # asked for when it walks
         )

@@ -122,9 +122,15 @@ class Demand(MotionDemand):
 
     def frame(self) -> DataFrame:
         """Position, velocity, acceleration and torque over time, units in the column names."""
-        from pipeline.simulation.walk_stand import walking_joint_demand
-
-        return walking_joint_demand(self)
+        units = {"position": ("rad", "m"), "velocity": ("rad_s", "m_s")}
+        units |= {"acceleration": ("rad_s2", "m_s2"), "torque": ("Nm", "N")}
+        values = {
+            tuple(f"{name}_{pair[joint in self.sliding]}" for joint in self.joints): np.concatenate(
+                [getattr(part, name) for part in self.segments]
+            )
+            for name, pair in units.items()
+        }
+        return series(*_support(self.segments), self.joints, values)
 
     def __str__(self) -> str:
         """What moves, for how long, and the largest torque of every joint."""
@@ -304,19 +310,6 @@ def tables_of_walking(machine: Machine, walking: Walking) -> Computed:
     grounded = ("walking_contact_forces", "walking_base", "walking_stability")
     floating = machine.robot.spec.floating
     return {name: table for name, table in tables.items() if floating or name not in grounded}
-
-
-def walking_joint_demand(demand: Demand) -> DataFrame:
-    """Motion and torque of every joint over the cycle."""
-    units = {"position": ("rad", "m"), "velocity": ("rad_s", "m_s")}
-    units |= {"acceleration": ("rad_s2", "m_s2"), "torque": ("Nm", "N")}
-    values = {
-        tuple(f"{name}_{pair[joint in demand.sliding]}" for joint in demand.joints): np.concatenate(
-            [getattr(part, name) for part in demand.segments]
-        )
-        for name, pair in units.items()
-    }
-    return series(*_support(demand.segments), demand.joints, values)
 
 
 def _support(segments: Sequence[Any]) -> tuple[Any, dict[str, list[str]]]:
