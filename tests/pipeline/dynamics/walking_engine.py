@@ -46,24 +46,15 @@ def walked(
     tilt: float = 0.0,
     coulomb: dict[str, float] | None = None,
     gain: dict[str, float] | None = None,
-    seed: int = 1,
     kp: float = KP,
     noise: float = TORQUE_NOISE,
 ) -> Walked:
-    """Let it walk cycles of these periods [s] with a payload at a point of the base.
+    """Let it walk cycles of these periods [s], or stand and go slowly down and up so long [s].
 
-    Args:
-        robot: Of a robot file with a gait.
-        periods: [s].
-        squats: Time for which it stands and goes slowly down and up in place of walking [s].
-        payload: Mass [kg] and place [m].
-        centre: By how much the base's centre of mass lies further ahead [m].
-        tilt: Of the ground, about the lateral axis [rad].
-        coulomb: Joint to its friction [N*m].
-        gain: Joint to how many times what it should its torque reads.
-        seed: Of the noise.
-        kp: Of the servos [N*m/rad].
-        noise: Of the torques [N*m].
+    `payload`: mass [kg] and its place on the base [m]. `centre`: by how much the base's centre of
+    mass lies further ahead [m]. `tilt`: of the ground about the lateral axis [rad]. `coulomb`,
+    `gain`: by joint, friction [N*m] and what torques read over what they should. `kp`: of the
+    servos [N*m/rad]. `noise`: of torques [N*m].
     """
     kd = kp * KD / KP
     course = squatting(robot, squats) if squats else gait_course(robot, periods, STEP)
@@ -80,7 +71,7 @@ def walked(
     mujoco.mj_forward(model, data)
     lowest = min(data.geom_xpos[k][2] for k in feet)
     data.qpos[2] += RADIUS - lowest
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     out: dict[str, list[np.ndarray]] = {k: [] for k in ("q", "torque", "force", "turn")}
     settle = round(0.5 / STEP)
     for k in range(-settle, course.time.size):
@@ -105,13 +96,7 @@ def walked(
 
 
 def squatting(robot: Robot, duration: float, depth: float = 0.15) -> Course:
-    """Standing on all feet while the base goes down and up, twice slowly and twice faster.
-
-    Args:
-        robot: Of a robot file with a gait.
-        duration: [s].
-        depth: Share of the height over the feet.
-    """
+    """Standing so long [s] while the base goes down and up, twice slowly and twice faster."""
     first = gait_course(robot, (2.0,), STEP).q[0]
     time = np.arange(round(duration / STEP)) * STEP
     phase = np.where(time < duration / 2, 1.0, 2.0) * 4.0 * np.pi * time / duration

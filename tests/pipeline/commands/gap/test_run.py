@@ -40,15 +40,6 @@ def test_the_demonstration_names_what_was_hidden_and_its_model_file_goes_round(c
 
 
 @pytest.mark.usefixtures("sketched")
-def test_where_begins_with_the_joint_where_an_effect_is_hidden(tmp_path, short_demo):
-    assert exit_code(["gap", "where", str(short_demo), "--out", str(tmp_path)]) == 0
-    rows = rows_of(tmp_path / "where.csv")
-    assert rows[0]["joint"] == HIDDEN.place[0]
-    shares = [float(r["share_of_total"]) for r in rows if r["by"] == "joint"]
-    assert sum(shares) == pytest.approx(1.0)
-
-
-@pytest.mark.usefixtures("sketched")
 @pytest.mark.parametrize(("without", "both"), [("motion", False), ("effort", True), ("", True)])
 def test_a_joint_that_stands_still_or_has_no_effort_is_left_out(tmp_path, without, both):
     """In one of two logs, or in both; or its columns are not there at all."""
@@ -70,6 +61,7 @@ def test_a_joint_that_stands_still_or_has_no_effort_is_left_out(tmp_path, withou
     rows = [r for r in rows_of(out / "where.csv") if r["by"] == "joint"]
     assert rows[0]["joint"] == HIDDEN.place[0]
     assert (joint in {r["joint"] for r in rows}) != both
+    assert sum(float(r["share_of_total"]) for r in rows) == pytest.approx(1.0)
 
 
 Columns = dict[str, np.ndarray]
