@@ -162,3 +162,14 @@ def test_a_resistance_of_no_stated_terminals_is_between_two_or_of_a_phase():
     assert any(note.startswith("resistance_of is not printed: phase-to-phase") for note in notes)
     low, high = made.parameter("motor.resistance").interval
     assert high == pytest.approx(2.0 * low)
+
+
+@pytest.mark.parametrize(("off", "noted"), [(0.045, 0), (0.055, 1), (0.145, 1)])
+def test_numbers_that_differ_are_rounded_noted_or_refused(off, noted):
+    """Up to 5 % is rounding, up to 15 % a winding's scatter; more is another motor or unit."""
+    alone = dict.fromkeys(("stall_torque", "continuous_torque", "no_load_speed"))
+    of_speed = 30 / math.pi / 317  # [N*m/A]
+    _, notes = read(words(alone | {"torque_constant": f"{(1 + off) * of_speed} N*m/A"}))
+    assert sum("; used: torque_constant" in note for note in notes) == noted
+    with pytest.raises(LegwattError, match="but speed_constant"):
+        read(words(alone | {"torque_constant": f"{1.155 * of_speed} N*m/A"}))
