@@ -17,6 +17,7 @@ from pipeline.dynamics.contact_forces import (
     GroundForces,
     least_tangential_forces,
     out_of_bounds,
+    refuse_falling,
 )
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.motion import Segment
@@ -149,6 +150,18 @@ def test_on_a_slope_the_ground_carries_the_weight_with_the_friction_of_its_angle
     segment_demand(robot, segment, forces=GroundForces(friction_coefficient=0.2127))  # tan 12 deg
     with pytest.raises(StanceError, match=r"slides at t = 0 s .* leg '\w+' .* of 0\.212;"):
         segment_demand(robot, segment, forces=GroundForces(friction_coefficient=0.212))
+
+
+@pytest.mark.parametrize("force", [[0.0, 0.0, -1e-2], [0.51, 0.0, 1.0]], ids=["pull", "slide"])
+def test_a_foot_pulls_or_slides_by_rounding_alone(hexapod, force):
+    """One of them by a ten-thousandth of what the others bear, or by next to nothing."""
+    segment = standing_posture(hexapod)
+    every = np.tile([0.0, 0.0, 100.0], (1, len(segment.stance), 1))
+    every[0, 0] = force
+    with pytest.raises(StanceError):
+        refuse_falling(hexapod, segment, every, 0.5)
+    every[0, 0] = [0.0, 0.0, -1e-8]
+    refuse_falling(hexapod, segment, every, 0.5)
 
 
 def internal(feet: np.ndarray) -> np.ndarray:

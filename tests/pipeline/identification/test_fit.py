@@ -121,7 +121,8 @@ def test_a_body_is_worth_what_the_directions_of_a_base_agree_on(agree):
     tied = settled(start_fit(design, np.array([1e-9] * 3)))
     loose = settled(replace(tied, loose=frozenset([design.terms[-1].block])))
     assert loose.evidence > tied.evidence
-    assert (loose.worth > tied.worth) == agree
+    assert (loose.worth > tied.worth) == (loose.rise(tied) > 0.0) == agree
+    assert tied.rise(loose) < 0.0  # by the evidence, whatever the directions say
     fixed = replace(design, equations=tuple(replace(e, joint=e.joint - 3) for e in equations))
     assert replace(loose, design=fixed).worth == loose.evidence
 
