@@ -100,18 +100,14 @@ B1, B2, MU, N, R2 = np.radians(80.0), np.radians(25.0), 0.1, 30.0, 0.0315
 HYPOID = Hypoid("h", N, B1, B2, R2, MU)
 
 
-def test_efficiency_of_a_hypoid_gear_driving_and_driven_in_closed_form():
+def test_efficiency_and_sliding_speed_of_a_hypoid_gear_in_closed_form():
     for sign in (1.0, -1.0):
         s = constant(sign, 30.0)
         expected = (1 + sign * MU * np.tan(B1)) / (1 + sign * MU * np.tan(B2))
         np.testing.assert_allclose(HYPOID.inverse(s).power / s.power, expected, rtol=1e-13)
-    locking = Hypoid("h", N, B1, B2, R2, 0.2)
-    low, high = locking.holding(np.array([-30.0, 30.0]), np.array([-30.0, 30.0]))
-    assert (low < 0).all()
+    low, high = Hypoid("h", N, B1, B2, R2, 0.2).holding(*2 * [np.array([-30.0, 30.0])])
+    assert (low < 0).all()  # it locks
     assert (high > 0).all()
-
-
-def test_sliding_speed_is_the_difference_along_the_teeth():
     # Independent of the loss law: pitch-point velocities of both gears as vectors in the common
     # tangent plane, each at its spiral angle to the tooth trace.
     s = constant(1.0, 30.0)
@@ -142,23 +138,20 @@ def test_a_spring_and_a_ripple_follow_their_laws_and_store_no_net_energy():
         chain(spring).holding(np.ones(3))
 
 
-def swing(rate=400.0, seconds=4.0):
-    """Angle and speed of a motion that reverses many times, some of them after small travels."""
-    t = np.arange(0.0, seconds, 1.0 / rate)
-    q = 0.02 * np.sin(3.0 * t) + 0.004 * np.sin(17.0 * t + 0.4)
-    return t, q, 0.06 * np.cos(3.0 * t) + 0.068 * np.cos(17.0 * t + 0.4)
-
-
 def test_the_sense_of_presliding_is_that_of_dahls_differential_equation():
-    travel = 0.003
-    t, q, v = swing(rate=4000.0)
-    sense = presliding(t, q, np.sign(v), travel)
+    """Along a motion that reverses many times, some of them after small travels."""
+    t, travel = np.arange(0.0, 4.0, 1 / 4000), 0.003
+    q = 0.02 * np.sin(3.0 * t) + 0.004 * np.sin(17.0 * t + 0.4)
+
+    def speed(now):
+        return 0.06 * np.cos(3.0 * now) + 0.068 * np.cos(17.0 * now + 0.4)
 
     def slope(now, s):
-        speed = 0.06 * np.cos(3.0 * now) + 0.068 * np.cos(17.0 * now + 0.4)
-        return (np.sign(speed) - s) * abs(speed) / travel
+        return (np.sign(speed(now)) - s) * abs(speed(now)) / travel
 
-    exact = solve_ivp(slope, (t[0], t[-1]), [np.sign(v[0])], t_eval=t, max_step=1e-3, rtol=1e-8)
+    sense = presliding(t, q, np.sign(speed(t)), travel)
+    start = [np.sign(speed(0.0))]
+    exact = solve_ivp(slope, (t[0], t[-1]), start, t_eval=t, max_step=1e-3, rtol=1e-8)
     assert sense.min() < -0.5 < 0.5 < sense.max()
     np.testing.assert_allclose(sense, exact.y[0], atol=2e-3)
 

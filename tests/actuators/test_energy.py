@@ -219,15 +219,10 @@ def test_life_in_modes_with_return_is_that_of_a_general_integrator():
     assert b.hours(np.array([900.0, -9e3]), np.array([0.5, 0.5])) == math.inf
 
 
-def test_a_driver_s_efficiency_is_met_at_full_voltage_and_current():
-    driver = driver_of("escon", values(PARTS["maxon_escon_mod_50_5"], 0.0))
-    given = 0.98 * 50 * 5.0
-    loss = driver.loss(np.array(5.0), 50.0)
-    assert given / (given + loss) == pytest.approx(0.98)
-
-
-def test_one_driver_loses_the_same_whatever_the_motor_s_ampere():
+def test_a_driver_meets_its_efficiency_and_loses_the_same_whatever_the_motor_s_ampere():
     """The same copper loss c R I^2 is the same current; conduction goes with it."""
+    driver, given = driver_of("escon", values(PARTS["maxon_escon_mod_50_5"], 0.0)), 0.98 * 50 * 5.0
+    assert given / (given + driver.loss(np.array(5.0), 50.0)) == pytest.approx(0.98)
     x = values(PARTS["moteus_n1"])
     own, other = (driver_of("n1", x, current_of=c) for c in (1.0, 1.5))
     current = np.array(8.0 / math.sqrt(1.5))

@@ -75,24 +75,19 @@ def test_copper_loss_and_power_are_those_of_three_phases_in_every_convention(
     assert p["motor.supply_voltage"] / k == pytest.approx(volts / between, rel=1e-8)
 
 
-def test_without_load_the_motor_draws_its_no_load_current(tmp_path):
-    own = chain(tmp_path, coulomb_share="0.3", no_load_voltage=None, gear_inertia=None)
+def test_current_without_load_efficiency_and_torque_that_drives_back_are_those_printed(tmp_path):
+    own = chain(tmp_path / "a", coulomb_share="0.3", no_load_voltage=None, gear_inertia=None)
     speed = 7580 * math.pi / 30 / 12.25
     assert own.inverse(constant(speed, 0.0)).current == pytest.approx(0.137, rel=1e-9)
-
-
-def test_a_gear_drives_with_its_efficiency_and_loses_as_much_when_driven(tmp_path):
-    own = chain(tmp_path, no_load_current="0 A", gear_efficiency="0.81")
-    for torque, share in ((5.0, 1 / 0.81), (-5.0, 2 - 1 / 0.81)):
+    own = chain(tmp_path / "b", no_load_current="0 A", gear_efficiency="0.81")
+    for torque, share in ((5.0, 1 / 0.81), (-5.0, 2 - 1 / 0.81)):  # as much is lost when driven
         result = own.inverse(constant(3.0, torque))
         assert result.motor.power == pytest.approx(torque * 3.0 * share, rel=1e-9)
         lost = result.losses["gear_friction"]
         assert lost == pytest.approx(5.0 * 3.0 * (1 / 0.81 - 1), rel=1e-9)
         assert np.abs(balance_residual(result)).max() < 1e-12
-
-
-def test_the_torque_that_drives_it_back_is_the_one_at_which_it_yields(tmp_path):
-    own = chain(tmp_path, no_load_current=None, coulomb_share=None, back_drive_torque="0.51 N*m")
+    plain = dict.fromkeys(("no_load_current", "coulomb_share"))
+    own = chain(tmp_path / "c", **plain, back_drive_torque="0.51 N*m")
     assert own.inverse(constant(1e-9, -0.51)).motor.torque == pytest.approx(0.0, abs=1e-10)
     held = own.holding(np.array([0.509, 0.511]))
     assert held.motor_torque[0] == 0.0 < held.motor_torque[1]

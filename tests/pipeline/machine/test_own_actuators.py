@@ -85,14 +85,6 @@ def test_as_built_every_joint_takes_what_its_own_alternative_takes(given):
         assert standing.holding[AS_BUILT].power[k] == standing.holding[alone].power[k]
 
 
-def test_a_folder_of_actuator_files_is_found_beside_the_robot_file(root, tmp_path):
-    path = robot_file(root, tmp_path, '[actuators]\nfolder = "ours"\n')
-    with pytest.raises(LegwattError, match=r"actuators\.folder: no folder"):
-        load(path)
-    (tmp_path / "ours").symlink_to(root / "actuators" / "catalog")
-    assert load(path).actuator_folder == tmp_path / "ours"
-
-
 JOINT = '[[actuators.joint]]\njoints = ["rm_joint_2"]\n'
 NUMBER = '{value = 160, unit = "1", basis = "datasheet", source = "x"}'
 
@@ -102,6 +94,7 @@ NUMBER = '{value = 160, unit = "1", basis = "datasheet", source = "x"}'
     [
         ('[actuators]\nalternative = "rotr"\n', "no alternative 'rotr': did you mean 'rotor'"),
         ("actuators = 3\n", "Input should be a valid dictionary, not 3"),
+        ('[actuators]\nfolder = "ours"\n', r"actuators\.folder: no folder"),
         ('[[actuators.joint]]\njoints = ["rm_joint_9"]\n', "joint 1: no joint 'rm_joint_9': did"),
         (JOINT + 'alternative = "rotor"\n', "as what is joint 'lf_joint_1' built"),
         (JOINT + f"parameters.ratioo = {NUMBER}\n", "unknown parameter 'ratioo': did you mean"),

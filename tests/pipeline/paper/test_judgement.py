@@ -119,15 +119,6 @@ def given(root: Path, *options: str, robot: Path | None = None) -> Machine:
     return walked_by("reports", "--robot", file, *options)
 
 
-def other_belt(folder: Path) -> Path:
-    """A catalogue whose reversible actuator names a stage otherwise."""
-    shutil.copytree(CATALOG, folder)
-    file = folder / "alternatives.toml"
-    text = file.read_text(encoding="utf-8")
-    file.write_text(text.replace('stage = "wg"', 'stage = "w"'), encoding="utf-8")
-    return folder
-
-
 def test_after_a_change_the_comparison_is_computed_anew_and_the_rest_left_out(root):
     run = given(root, "--set", "harmonic_drive.load=0.1", "--samples", "51")
     by = basis(run)
@@ -153,7 +144,10 @@ def test_whatever_a_run_may_change_is_noticed(spec, catalog, study, tmp_path):
     assert changed(catalog=catalog.replaced("harmonic_drive.viscous", viscous * (1 + 1e-9))) == []
     other = catalog.replaced("harmonic_drive.viscous", 1.0)
     assert changed(catalog=other) == ["harmonic_drive.viscous"]
-    assert changed(catalog=load_catalog(other_belt(tmp_path / "c"))) == ["alternatives.reversible"]
+    shutil.copytree(CATALOG, folder := tmp_path / "catalog")
+    file = folder / "alternatives.toml"  # a stage of another name
+    file.write_text(file.read_text("utf-8").replace('stage = "wg"', 'stage = "w"'), "utf-8")
+    assert changed(catalog=load_catalog(folder)) == ["alternatives.reversible"]
     assert changed(spec=spec.with_parameters({"body_length": 0.601})) == ["robot.body_length"]
 
 
