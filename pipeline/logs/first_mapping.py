@@ -38,13 +38,16 @@ _WORDS: Final = {
     "goal": "goal target cmd command commanded desired des d ref reference setpoint sp",
     "no measurement": "enabled enable status error mode on off raw flag",
     "motor": "motor rotor",
+    "supply": "supply battery bus bat rail pack psu",
     "empty": "joint joints state states actual act measured meas present axis servo robot data leg "
     "motor rotor",
 }
 _KEYWORD: Final = {word: name for name, text in _QUANTITIES.items() for word in text.split()}
 _SAYS: Final = {role: {*text.split()} for role, text in _WORDS.items()}
-#: Owner of a column that is of no joint that the robot has.
-NOBODY: Final = "JOINT"
+#: Owners of columns: the supply of all drives, and no joint that the robot has.
+SUPPLY, NOBODY = "supply", "JOINT"
+#: Quantities of a supply, by those of a joint.
+_OF_SUPPLY: Final = {"voltage": "supply", "current": "supply_current", "power": "supply_power"}
 #: What a unit tells where no word does.
 _OF_UNIT: Final = {
     **{"angle": "position", "angular velocity": "velocity"},
@@ -185,7 +188,7 @@ def _name_owners(guesses: Sequence[Guess], joints: Sequence[str]) -> str:
     told, by = assign(known, joints)
     # Joints that other quantities call otherwise than positions do: `enc 1`, `motor 1 A`.
     called = {q: assign([*own], known)[0] if {*own} - {*known} else {} for q, own in names.items()}
-    for g in guesses:
+    for g in (g for g in guesses if g.owner != SUPPLY):
         g.owner = told.get(called[g.quantity].get(g.owner, g.owner), NOBODY)
     return by
 
@@ -195,7 +198,7 @@ def _tell_unit(g: Guess, x: Array, position: Guess | None, expected: Expected) -
     if g.unit or g.owner == NOBODY:
         return
     low, high = float(np.nanmin(x)), float(np.nanmax(x))
-    if g.quantity == "current":
+    if g.quantity.endswith("current"):
         g.unit = "mA" if max(-low, high) > _AMPERES else ""
     elif position is not None and g.quantity in ("goal_position", "velocity"):
         g.unit = position.unit + "/s" * (g.quantity == "velocity" and position.unit == "deg")
@@ -261,6 +264,8 @@ def _read(column: str, text: str, unit: str, by_unit: bool) -> Guess:
         quantity = ""
     elif goal:
         quantity = "goal_position" if quantity in ("", "position") else ""
+    elif _SAYS["supply"] & {*words}:
+        quantity, owner = _OF_SUPPLY.get(quantity, ""), SUPPLY
     elif _SAYS["motor"] & {*words} and quantity == "position":
         quantity = "motor_position"
     if quantity and unit and dimension(UNITS[quantity]) != dimension(unit):
