@@ -37,10 +37,6 @@ _TOO_STRONG: Final = 5.0
 _WEIGHT: Final = 0.1
 #: Times the weight, or a part of it, that no load is but another unit.
 _NO_LOAD: Final = 3.0
-#: Share of a log's time that may lie in longer steps: those are gaps, not the channel's rate ...
-_IN_GAPS: Final = 0.02
-#: ... as are steps this many times longer than the usual one.
-_LONG: Final = 20.0
 #: Rows looked at for the lattice of values.
 LATTICE_ROWS: Final = 100_000
 #: Half-width of the window in which a channel's mean change per row is taken.
@@ -59,14 +55,12 @@ _CHANCE: Final = 1e-6
 _LEAST_RUN: Final = 20
 #: Share of the shorter log's moving rows from which two logs count as the same data.
 _SHARE: Final = 0.02
+#: Share of a joint's range by which positions may leave it.
+_MARGIN: Final = 0.05
 #: What positions beyond the limits of a joint may be.
-_DEGREES: Final = (
-    "looks like degrees, or a motor's angle; in a mapping file: "
-    'unit = "deg", or scale = 1 over the gear ratio'
-)
 _OUTSIDE: Final = (
-    "outside: it turns over, or another zero or sign, a motor's angle, another joint's column or "
-    "the log of another robot"
+    'degrees (in a mapping file: unit = "deg"), a motor\'s angle (scale = 1 over the gear ratio), '
+    "another zero or sign, another joint's column, or the log of another robot"
 )
 
 
@@ -186,27 +180,22 @@ def _silent(log: Recording, joint: str, q: Array, x: Array, found: Findings) -> 
 
 
 def _limits(log: Recording, expected: Expected, found: Findings) -> None:
-    """Good positions against the limits of the joints, efforts against those of drives."""
+    """Positions against the limits of the joints, efforts against those of drives."""
     for j, joint in enumerate(log.joints):
         q, column = log.position_of(joint), column_name(joint, log.position_quantity(joint))
         q = q[np.isfinite(q)]
-        if not q.size:
-            continue
         low, high = float(expected.lower[j]), float(expected.upper[j])
-        detail = f"runs from {q.min():.4g} to {q.max():.4g} rad, the joint's limits are "
-        detail += f"{low:.4g} to {high:.4g} rad: "
-        margin = 0.05 * (high - low) if np.isfinite(high - low) else 0.0
-        low, high = low - margin, high + margin
-        outside = float(np.mean((q < low) | (q > high)))
-        if outside == 0.0:
+        margin = _MARGIN * (high - low) if np.isfinite(high - low) else 0.0
+        outside = (q < low - margin) | (q > high + margin)
+        if not outside.any():
             continue
         # A joint that swings over goes beyond its limits by turns; degrees do by 57 times.
-        turned = np.radians(q)
-        degrees = np.ptp(q) > TURNS and turned.min() >= low and turned.max() <= high
-        away = outside > 0.5 and max(low - q.max(), q.min() - high) > TURNS
-        detail += _DEGREES if degrees else f"{100 * outside:.1f} % of the rows lie {_OUTSIDE}"
-        verdict = "suspected" if degrees or away else "warning"
-        found.note(column, "share_outside_limits", verdict, detail, outside)
+        far = max(np.ptp(q), low - q.max(), q.min() - high) > TURNS and outside.mean() > 0.5
+        detail = f"runs from {q.min():.4g} to {q.max():.4g} rad, {100 * outside.mean():.1f} % of "
+        detail += f"the rows outside the joint's limits of {low:.4g} to {high:.4g} rad: it turns "
+        detail += f"over, or {_OUTSIDE}"
+        verdict = "suspected" if far else "warning"
+        found.note(column, "share_outside_limits", verdict, detail, float(outside.mean()))
     largest = {"torque": expected.effort_limit, **expected.largest}
     for channel in (c for c in log.channels if c in largest):
         for joint, limit in zip(log.joints, largest[channel], strict=True):
@@ -264,16 +253,6 @@ def _moving_rows(log: Recording) -> NDArray[np.uint64]:
     return np.unique(both[(own[2:] != own[1:-1]) & (own[1:-1] != own[:-2])])
 
 
-def own_spacing(time: Array) -> float:
-    """Step between samples [s] that all but `_IN_GAPS` of the time keeps to; inf for none."""
-    step = np.sort(np.diff(time))
-    if step.size == 0:
-        return np.inf
-    step = step[: np.searchsorted(step, _LONG * step[step.size // 2], side="right")]
-    passed = np.cumsum(step)
-    return float(step[int(np.searchsorted(passed, (1.0 - _IN_GAPS) * passed[-1]))])
-
-
 def is_constant(x: Array) -> bool:
     """Whether a series (N,) holds one number and nothing else but empty cells."""
     x = x[np.isfinite(x)]
@@ -298,18 +277,6 @@ def quantum(x: Array) -> float:
             if np.mean(np.abs(gaps / step - np.round(gaps / step)) < 0.05) > least:
                 return step
     return 0.0
-
-
-def new_values(time: Array, x: Array) -> float:
-    """How often a channel takes a new value, by the median over its changes [Hz]; inf for never.
-
-    A rounded channel of speed v and step d does v / d times a second, and its error is a sawtooth
-    of that frequency: a filter that lets it pass shows the steps, and no speed between them.
-    """
-    changes = time[1:][np.diff(x) != 0]
-    if changes.size == 0:
-        return np.inf
-    return 1.0 / float(np.median(np.diff(changes) if changes.size > 1 else np.ptp(time)))
 
 
 def held(x: Array, moving: Mask, step: float) -> Mask:

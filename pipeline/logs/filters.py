@@ -20,7 +20,6 @@ import scipy  # its signal is loaded where it is first used: every command passe
 from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
-from actuators.errors import LegwattError
 
 #: Half-length of the kernel in units of 1 / cut-off.
 HALF_LENGTH: Final = 2.0
@@ -47,21 +46,10 @@ JITTER_IGNORED: Final = 0.05
 
 @dataclass(frozen=True)
 class LowPass:
-    """The filter at one sampling rate.
-
-    Raises:
-        LegwattError: The cut-off is not between zero and a quarter of the rate.
-    """
+    """The filter at one sampling rate, of which a cut-off is at most a quarter."""
 
     rate: float  #: Samples per second [Hz].
     cutoff: float  #: Frequency at which the amplitude is halved [Hz].
-
-    def __post_init__(self) -> None:
-        if not 0 < self.cutoff <= LARGEST_SHARE * self.rate * (1 + 1e-9):
-            raise LegwattError(
-                f"cut-off {self.cutoff:g} Hz does not fit a log sampled at {self.rate:g} Hz; "
-                f"expected up to {LARGEST_SHARE * self.rate:g} Hz"
-            )
 
     @property
     def half(self) -> int:

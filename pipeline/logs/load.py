@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, known
-from pipeline.logs.checks import judge, new_values, refuse_repeats
+from pipeline.logs.checks import judge, refuse_repeats
 from pipeline.logs.filters import (
     LARGEST_SHARE,
     LowPass,
@@ -51,11 +51,10 @@ from pipeline.logs.reduce import (
     LONGEST_KERNEL,
     STANCE,
     Settings,
-    changes,
     choose_settings,
     reduced,
 )
-from pipeline.logs.speeds import MOST_TAKEN, narrowed, near_rest
+from pipeline.logs.speeds import MOST_TAKEN, changes, narrowed, near_rest
 from pipeline.robot.robot import Robot
 
 #: A joint that moves by less is still and its encoder noisy: share of its range, or angle [rad]
@@ -188,7 +187,8 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
     if not asked.apart:
         rows = _STRETCH_ROWS * settings.step
         share = MOST_ROWS * settings.step / sum(map(len, read))
-        read = [shortened(log, max(1, int(share * len(log) / rows)), rows) for log in read]
+        if share < 1.0:
+            read = [shortened(log, max(1, int(share * len(log) / rows)), rows) for log in read]
     logs = with_rest([reduced(log, settings, asked.robot) for log in read])
     found += [finding for log in logs for finding in _seen(log)]
     refuse(found)
@@ -200,25 +200,23 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
 
 
 def _together(logs: Sequence[Recording]) -> list[Recording]:
-    """Logs with the same columns as one each: what a log costs beside its rows is paid once."""
-    kinds: dict[tuple[object, ...], list[Recording]] = {}
+    """Logs of the same columns as one, in which each begins long after the one before.
+
+    What a log costs beside its rows is paid once.
+    """
+    kinds, out = dict[tuple[object, ...], list[Recording]](), []
     for log in logs:
         kinds.setdefault((*log.left_out, *log.frame.columns), []).append(log)
-    return [_as_one(own) for own in kinds.values()]
-
-
-def _as_one(logs: Sequence[Recording]) -> Recording:
-    """Logs of the same columns as one, in which each begins long after the one before."""
-    frames, begin = [], 0.0
-    for log in logs:
-        frames.append(log.frame.assign(**{TIME: log.time - log.time[0] + begin}))
-        begin = float(frames[-1][TIME].iloc[-1]) + _APART
-    return replace(
-        logs[0],
-        name=logs[0].name if len(logs) == 1 else f"{logs[0].name} to {logs[-1].name}",
-        frame=pd.concat(frames, ignore_index=True),
-        sha256=hashlib.sha256("".join(log.sha256 for log in logs).encode()).hexdigest(),
-    )
+    for own in kinds.values():
+        frames, begin = [], 0.0
+        for log in own:
+            frames.append(log.frame.assign(**{TIME: log.time - log.time[0] + begin}))
+            begin = float(frames[-1][TIME].iloc[-1]) + _APART
+        one = replace(own[0], frame=pd.concat(frames, ignore_index=True))
+        sha256 = hashlib.sha256("".join(log.sha256 for log in own).encode()).hexdigest()
+        name = f"{own[0].name} to {own[-1].name}" if len(own) > 1 else own[0].name
+        out.append(replace(one, name=name, sha256=sha256))
+    return out
 
 
 def _as_asked(log: Recording, asked: Asked) -> Recording:
@@ -330,13 +328,15 @@ def _naming(settings: Settings, logs: Sequence[Log], felt: Callable[[Log], Array
 def step_rate(log: Log) -> tuple[int, float]:
     """The joint that moves furthest, and how often its position takes a new value [Hz].
 
-    A filter that passes this frequency shows the steps of a rounded position. Joints that hardly
-    move may well stand between two steps.
+    A rounded channel of speed v and step d does v / d times a second, and its error is a sawtooth
+    of that frequency: a filter that lets it pass shows the steps, and no speed between them. Joints
+    that hardly move may well stand between two steps.
     """
     assert log.recording is not None
     j = int(np.nanargmax(np.ptp(log.q, axis=0)))
-    q = log.recording.position_of(log.joints[j])
-    return j, new_values(log.recording.time[np.isfinite(q)], q[np.isfinite(q)])
+    own = log.recording.frame[[TIME, column_name(log.joints[j], "position")]].dropna().to_numpy()
+    new = own[1:][np.diff(own[:, 1]) != 0, 0]
+    return j, 1.0 / float(np.median(np.diff(new))) if new.size > 1 else np.inf
 
 
 def with_rest(logs: Sequence[Log]) -> list[Log]:

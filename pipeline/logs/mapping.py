@@ -9,10 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping as MappingType
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
 from actuators.arrays import Array
 from actuators.checked import Number, Table, Text, checked, read_toml
@@ -20,8 +20,6 @@ from actuators.errors import known, one_line
 from actuators.parameters import dimension, from_si, to_si
 from pipeline.logs.log import TIME
 
-#: Beyond these a number is a slip, and some product of it overflows.
-LARGEST: Final = 1e12
 #: Of servos, in words.
 LAW: Final = "kp (goal - position) + kd (goal velocity - velocity) + goal torque"
 #: What a reader of results must know of a torque that the servos' law gives.
@@ -38,9 +36,8 @@ def _not_zero(value: float) -> float:
     return value
 
 
-Small = Annotated[Number, Field(ge=-LARGEST, le=LARGEST)]
-Factor = Annotated[Small, AfterValidator(_not_zero)]
-Gain = Annotated[Number, Field(ge=0.0, le=1e6)]
+Factor = Annotated[Number, AfterValidator(_not_zero)]
+Gain = Annotated[Number, Field(ge=0.0)]
 Pattern = Annotated[Text, Field(pattern=r"^[^*]*\*?[^*]*$")]  # at most one star
 
 
@@ -58,7 +55,7 @@ def _unit_of(expected: str | None) -> AfterValidator:
 class QuantityTable(Table):
     """A number with its unit."""
 
-    value: Small
+    value: Number
     unit: Annotated[str, _unit_of(None)]
 
     @property
@@ -72,13 +69,7 @@ class TimeTable(Table):
 
     column: str | None = None
     unit: Annotated[str, _unit_of("time")] = "s"
-    sample_rate: Annotated[Number, Field(gt=0.0, le=1e9)] | None = None  #: [Hz]
-
-    @model_validator(mode="after")
-    def _one(self) -> Self:
-        if self.sample_rate is not None and self.column is not None:
-            raise ValueError("give column or sample_rate, not both")
-        return self
+    sample_rate: Annotated[Number, Field(gt=0.0)] | None = None  #: [Hz], instead of stamps.
 
 
 class ColumnTable(Table):
@@ -86,10 +77,10 @@ class ColumnTable(Table):
 
     target: Pattern | None = Field(default=None, alias="as")
     unit: Annotated[str, _unit_of(None)] | None = None
-    zero: Small = 0.0
+    zero: Number = 0.0
     scale: Factor = 1.0
     flip: bool = False
-    late: Small = 0.0
+    late: Number = 0.0
 
     def renamed(self, pattern: str, column: str) -> str | None:
         """The column of the log format a column of the file becomes, or None."""
@@ -111,7 +102,7 @@ class ColumnTable(Table):
 class ControllerTable(Table):
     """The drive's controller."""
 
-    gain_per_rad: Small | None = None
+    gain_per_rad: Number | None = None
     torque_off_bridge: Literal["open", "shorted"] | None = None
 
 

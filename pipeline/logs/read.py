@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, replace
-from difflib import SequenceMatcher
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final, TypeGuard
 
@@ -35,9 +35,8 @@ from pipeline.logs.mapping import CANNOT, LAW, ColumnTable, Mapping
 
 POSITIONS: Final = ("position", "motor_position")
 AS_NAMED: Final = ColumnTable()
-#: Similarity from which a column that is unused is taken for a slip of the pen: of an owner, and of
-#: a quantity, whose unit may be another.
-_NEAR, _NEAR_QUANTITY = 0.85, 0.75
+#: Similarity from which a column that is unused is taken for a slip of the pen.
+_NEAR: Final = 0.85
 #: Nothing a robot measures is larger in the log's units.
 _LARGEST: Final = 1e9
 #: Difference from a stated gear ratio, relative, from which the two positions contradict it.
@@ -154,30 +153,20 @@ def _refuse_unknown_names(plan: ReadingPlan, owners: set[str]) -> None:
 
 
 def _refuse_slips(plan: ReadingPlan, ignored: MappingType[str, str]) -> None:
-    """Refuse columns one or two letters, or a unit, off those of a column that is not there.
+    """Refuse columns a few letters off those of a column that is not there.
 
     A column that is left out for that would cost a channel, or a joint, without a word.
     """
     columns = plan.expected.columns
     missing = [name for name, target in columns.items() if target.name not in plan.sources]
     for column, name in ignored.items():
-        near = (
-            other for other in missing * ("__" in name) if _is_slip(name.lower(), other.lower())
-        )
-        if (other := next(near, None)) is not None:
+        digits = re.sub(r"\D", "", name)
+        alike = [n for n in missing if "__" in name and re.sub(r"\D", "", n) == digits]
+        if near := get_close_matches(name, alike, n=1, cutoff=_NEAR):
             raise LegwattError(
                 f"{plan.source.where}: '{one_line(column)}' is none of the log format and would be "
-                f"ignored; did you mean '{other}'? Give name and unit in a mapping file"
+                f"ignored; did you mean '{near[0]}'? Give name and unit in a mapping file"
             )
-
-
-def _is_slip(name: str, other: str) -> bool:
-    (owner, _, quantity), (its, _, known_as) = name.rpartition("__"), other.rpartition("__")
-    if owner == its:
-        near = SequenceMatcher(None, known_as, quantity).ratio() >= _NEAR_QUANTITY
-    else:
-        near = quantity == known_as and SequenceMatcher(None, its, owner).ratio() >= _NEAR
-    return near and re.sub(r"\D", "", name) == re.sub(r"\D", "", other)
 
 
 def _refuse_missing(plan: ReadingPlan) -> None:

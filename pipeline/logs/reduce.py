@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
@@ -17,7 +17,7 @@ from scipy.ndimage import uniform_filter1d
 
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
-from pipeline.logs.checks import own_spacing, quantum
+from pipeline.logs.checks import quantum
 from pipeline.logs.filters import (
     FLAT,
     LARGEST_SHARE,
@@ -31,7 +31,7 @@ from pipeline.logs.filters import (
     smoother_noise,
 )
 from pipeline.logs.log import UNUSED, Findings, Log, Recording, column_name
-from pipeline.logs.speeds import FACTOR, friction_sign, weigh, within
+from pipeline.logs.speeds import FACTOR, changes, friction_sign, weigh, within
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
 
@@ -45,15 +45,8 @@ LOWEST: Final = 0.005
 _CALM: Final = 0.1
 
 
-class Contact(NamedTuple):
-    """Which feet stand."""
-
-    standing: Mask  #: Shape (N, F), legs as the robot has them.
-    source: str  #: ``"forces"``, ``"columns"`` or ``"lowest feet"``.
-
-
-def find_contact(log: Recording, robot: Robot | None = None) -> Contact | None:
-    """Contact from forces, else contact columns, else the lowest feet.
+def find_contact(log: Recording, robot: Robot | None = None) -> tuple[Mask, str] | None:
+    """Which feet stand, (N, F), and from what: forces, else contact columns, else the lowest feet.
 
     Args:
         log: As read.
@@ -64,10 +57,10 @@ def find_contact(log: Recording, robot: Robot | None = None) -> Contact | None:
         full = max(float(np.nanmax(normal, initial=0.0)), 1e-9)
         decided = np.where(normal > TOUCH * full, 1.0, np.where(normal < LIFT * full, 0.0, np.nan))
         # Undecided samples keep the last decision.
-        return Contact(pd.DataFrame(decided).ffill().to_numpy() > 0.5, "forces")
+        return pd.DataFrame(decided).ffill().to_numpy() > 0.5, "forces"
     if (touching := log.contact) is not None:
-        return Contact(touching, "columns")
-    return None if robot is None else Contact(_lowest(robot, log), "lowest feet")
+        return touching, "columns"
+    return None if robot is None else (_lowest(robot, log), "lowest feet")
 
 
 def _lowest(robot: Robot, log: Recording) -> Mask:
@@ -84,21 +77,14 @@ def _lowest(robot: Robot, log: Recording) -> Mask:
     return np.asarray(height <= height.min(axis=1, keepdims=True) + LOWEST)
 
 
-def changes(standing: Mask, pieces: Sequence[slice]) -> Mask:
-    """Rows to either side of a change of each foot's stance, (N, F), none across gaps."""
-
-    def changed(own: Mask) -> Mask:
-        new = np.diff(own, axis=0, prepend=own[:1])
-        new[:-1] |= new[1:]
-        return new
-
-    return np.asarray(by_piece(changed, standing, pieces))
-
-
 #: The kernel may not be longer than this share of the log.
 LONGEST_KERNEL: Final = 0.1
 #: Cut-off per own rate of a channel: bridging by straight lines takes 5 % at that frequency.
 OWN_SHARE: Final = 0.125
+#: Share of a log's time that may lie in longer steps: those are gaps, not the channel's rate ...
+_IN_GAPS: Final = 0.02
+#: ... as are steps this many times longer than the usual one.
+_LONG: Final = 20.0
 #: Share of the kernel's weight that may fall on missing samples before the output is masked.
 TOLERATED_SHARE: Final = 0.05
 #: Rows kept per period of the cut-off; predictions are made and filtered at this rate.
@@ -213,12 +199,14 @@ def choose_settings(
 
 def _held(log: Recording) -> float:
     """Highest frequency that the slowest channel of a log holds [Hz]."""
-    own = log.clock
-    steps = [own_spacing(own)]
-    for good in map(np.isfinite, (log.position, log.efforts)):
-        sparse = np.flatnonzero(good.any(axis=0) & ~good.all(axis=0))
-        steps += [own_spacing(log.time[good[:, j]]) for j in sparse]
-    slowest = max(step for step in steps if np.isfinite(step))
+    own, slowest = log.clock, 0.0
+    flags = np.isfinite(np.hstack([log.position, log.efforts])).T
+    for time in (own, *(log.time[ok] for ok in flags if ok.any() and not ok.all())):
+        # The step that all but a little of the time keeps to, which lies in gaps.
+        step = np.sort(np.diff(time))
+        if step.size:
+            passed = np.cumsum(step := step[step <= _LONG * step[step.size // 2]])
+            slowest = max(slowest, step[np.searchsorted(passed, (1.0 - _IN_GAPS) * passed[-1])])
     # A step or two more than usual is what interpolation bridges anyway.
     return OWN_SHARE / slowest if slowest > 1.9 * float(np.median(np.diff(own))) else np.inf
 
@@ -244,7 +232,7 @@ class _OnGrid:
         """
         calm: Mask = np.ones(self.grid.time.size, dtype=np.bool_)
         if self.contact is not None:
-            change = changes(self.contact.standing[self.grid.nearest], self.pieces)
+            change = changes(self.contact[0][self.grid.nearest], self.pieces)
             near = within(change, self.pieces, 2 * self.above.half)
             calm = ~np.asarray(near.any(axis=1))
         return calm if calm.mean() > _CALM else np.ones_like(calm)
@@ -326,8 +314,8 @@ class _OnGrid:
         """
         if self.contact is None:
             return {}
-        found.note("", "contact", "ok", f"which feet stand is known by {self.contact.source}")
-        stands = self.contact.standing[self.grid.nearest]
+        found.note("", "contact", "ok", f"which feet stand is known by {self.contact[1]}")
+        stands = self.contact[0][self.grid.nearest]
         measured, force = self.log.foot_force, self.smooth(self.log.foot_force)
         if force is None or measured is None:
             return {"standing": stands}

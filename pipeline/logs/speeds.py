@@ -196,9 +196,7 @@ def near_rest(
     """
     still = np.abs(v) < STANDING * rest
     # A fast joint turns back between two samples, neither of which is slow.
-    turned = np.signbit(v[1:]) != np.signbit(v[:-1])
-    still[1:] |= turned
-    still[:-1] |= turned
+    still |= changes(np.signbit(v), pieces)
     reach = int(np.ceil(SEEN * rate / bandwidth)) if np.isfinite(bandwidth) else 0
     return narrowed(still, np.abs(v) >= STANDING * rest, pieces, reach)
 
@@ -217,6 +215,14 @@ def narrowed(event: Mask, wanted: Mask, pieces: Sequence[slice], reach: int) -> 
             break
         out[:, lost] = within(event[:, lost], pieces, reach >> k if k < HALVED else 0)
     return out
+
+
+def changes(state: Mask, pieces: Sequence[slice]) -> Mask:
+    """Rows to either side of a change of a state (N, C), none across gaps."""
+    new = np.diff(state, axis=0, prepend=state[:1])
+    new[[piece.start for piece in pieces]] = False
+    new[:-1] |= new[1:]
+    return np.asarray(new)
 
 
 def within(event: Mask, pieces: Sequence[slice], reach: int) -> Mask:

@@ -36,8 +36,7 @@ from pipeline.dynamics.residual import (
     sole_covariance,
 )
 from pipeline.logs.log import Log
-from pipeline.logs.reduce import changes
-from pipeline.logs.speeds import within
+from pipeline.logs.speeds import changes, within
 from pipeline.machine.machine import Bodies, MachineModel, changed_model
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import inverse_dynamics

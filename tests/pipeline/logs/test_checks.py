@@ -102,7 +102,7 @@ EDGES: dict[str, tuple[Callable[[Array, Array, float], Recording], list[tuple[fl
     # A twentieth of the range of 4 rad beyond it; most rows four turns away from it.
     "share_outside_limits": (
         outside,
-        [(2.19, ""), (2.21, "warning"), (-27.2, "warning"), (-27.4, "suspected")],
+        [(2.19, ""), (2.21, "warning"), (-27.0, "warning"), (-27.2, "suspected")],
     ),
 }
 

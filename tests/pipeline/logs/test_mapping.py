@@ -86,7 +86,6 @@ def test_separators_and_decimal_commas_are_told_by_the_file(
         ("[columns.x]\nunit = 'degrees'", ("degrees", "unknown unit")),
         ("[columns.x]\nscale = 0", ("scale", "zero")),
         ("[time]\nsample_rate = -5", ("sample_rate", "greater than 0")),
-        ("[time]\ncolumn = 't'\nsample_rate = 5", ("not both",)),
         ("[controller]\ntorque_off_bridge = 'opn'", ("did you mean 'open'",)),
         ("[constants.a__temperature_degC]\nvalue = 3\nunit = 'N'", ("a unit of force",)),
         ("[columns.nothing]\nas = 'a__power_W'", ("nothing", "log.csv")),

@@ -147,14 +147,14 @@ def test_contact_from_forces_and_lowest_feet(hexapod, walk):
     inside[:90] = inside[-90:] = False
     log = made_log(flat, flat, time=time)
     seen = find_contact(log, hexapod)
-    assert seen.source == "lowest feet"
-    assert np.array_equal(seen.standing[inside], truth[inside])
+    assert seen[1] == "lowest feet"
+    assert np.array_equal(seen[0][inside], truth[inside])
     force = np.zeros((len(q), 6, 3))
     force[..., 2] = 60.0 * truth + np.random.default_rng(0).normal(0, 0.3, truth.shape)
     feet = expected_of_robot(hexapod).feet
     found = find_contact(made_log(flat[:, :2], flat[:, :2], feet=feet, force=force))
-    assert found.source == "forces"
-    assert np.array_equal(found.standing, truth)
+    assert found[1] == "forces"
+    assert np.array_equal(found[0], truth)
 
 
 def speed_error(column: Array | None, q: Array, v: Array) -> tuple[float, float]:
