@@ -45,7 +45,7 @@ class JointDemand:
 
 
 def segment_demand(
-    robot: Robot, segment: Segment, *, forces: GroundForces = PAPER, quasi_static: bool = False
+    robot: Robot, segment: Segment, *, forces: GroundForces = PAPER
 ) -> tuple[JointDemand, ContactForces | None]:
     """Joint torques over one segment, with the contact forces they rest on.
 
@@ -57,8 +57,7 @@ def segment_demand(
         LegwattError: Fewer than three feet stand.
     """
     q, v, a = segment.configuration, segment.velocity, segment.acceleration
-    inertial = (np.zeros_like(v), np.zeros_like(a)) if quasi_static else (v, a)
-    generalised = inverse_dynamics(robot.model, (q, *inertial))
+    generalised = inverse_dynamics(robot.model, (q, v, a))
     own, ground = robot.velocity_index, None
     torque = generalised[:, own]
     if robot.floating:
@@ -118,14 +117,9 @@ class MotionDemand:
         return float(self.segments[-1].time[-1] - self.segments[0].time[0])
 
 
-def motion_demand(
-    robot: Robot, motion: Motion, *, forces: GroundForces = PAPER, quasi_static: bool = False
-) -> MotionDemand:
+def motion_demand(robot: Robot, motion: Motion, *, forces: GroundForces = PAPER) -> MotionDemand:
     """Joint demand along a motion; see `segment_demand`."""
-    parts = [
-        segment_demand(robot, segment, forces=forces, quasi_static=quasi_static)
-        for segment in motion.segments
-    ]
+    parts = [segment_demand(robot, segment, forces=forces) for segment in motion.segments]
     demands, contacts = zip(*parts, strict=True)
     return MotionDemand(demands, contacts)
 

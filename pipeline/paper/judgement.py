@@ -73,7 +73,6 @@ def basis(given: Machine) -> Basis | str | None:
         "a model file changes the robot, and the paper knows nothing of its effects": (
             given.model_file is not None
         ),
-        "the paper counts the links' inertia, this run does not": given.options.quasi_static,
         "the paper's ground forces are the least tangential ones, this run's are others": (
             given.forces != PAPER
         ),

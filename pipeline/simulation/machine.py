@@ -41,7 +41,6 @@ from pipeline.machine.own_actuators import (
     actuator_folder,
     own_actuators,
 )
-from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import changed_table, gait_keys, gait_of, gait_table, with_payload
 from pipeline.motion.walking import (
     DEFAULT_SAMPLES,
@@ -137,8 +136,7 @@ def _feet(spec: RobotSpec, value: object) -> tuple[str, ...]:
     try:
         return leg_list(feet, [*spec.leg_names], STANDING_FEET)
     except LegwattError as error:
-        example = ",".join(spec.leg_names[:LEAST_FEET])
-        raise LegwattError(f"{error}; write such as {STANDING_FEET}={example}") from None
+        raise LegwattError(f"{error}; expected such as LEG,LEG,LEG or all") from None
 
 
 def _refuse_without_effect(spec: RobotSpec, key: str) -> None:
@@ -354,8 +352,7 @@ class Machine:
         `motion`: its own, or one cycle of the gait, by default.
         """
         motion = motion or self.motion or walking_motion(self.edited, samples=self.options.samples)
-        quasi_static = self.options.quasi_static
-        of = motion_demand(self.edited, motion, forces=self.forces, quasi_static=quasi_static)
+        of = motion_demand(self.edited, motion, forces=self.forces)
         parts = tuple(map(self._beside_drives, of.segments))
         return Demand(parts, of.contacts, motion, self.edited.sliding_joints)
 

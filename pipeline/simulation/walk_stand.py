@@ -70,7 +70,6 @@ class WalkOptions(Table):
         le=MOST_SAMPLES,
         description="per half period of the gait",
     )
-    quasi_static: bool = Field(default=False, description="leave out the links' inertial terms")
     regeneration: Annotated[str, BeforeValidator(_known)] = Field(
         default="none",
         description="what becomes of electrical energy that motors return: none (it is lost), bus "

@@ -47,7 +47,7 @@ CHANGES = [
     (["harmonic_drive.load=-0.1"], 2, r"outside its bounds \[0, 0.5\]"),
     (["joint_1_range=5"], 2, r"'\w+_joint_1' would have to reach .* deg at t ="),
     (["tibia_length=100"], 2, r"mm beyond its reach; shorten the stroke"),
-    (["standing.feet=lf,lx"], 2, r"no leg 'lx'.*standing.feet=lf,lm,lr"),
+    (["standing.feet=lf,lx"], 2, r"no leg 'lx'.*LEG,LEG,LEG or all"),
     (["gait.speed=0.1 m/s", "gait.period=2 s", "foot_stroke=230"], 2, r"it changes nothing"),
     (["gait.slope_forward=25 deg"], 1, r"the robot tips at t = "),
     (["hip_spacing=200"], 1, r"leg 'lf' would have to pull with \d+\.\d N"),

@@ -161,7 +161,6 @@ def test_the_study_is_of_the_inputs_that_are_shipped(study):
 
 def test_a_run_the_paper_does_not_describe_is_left_out_with_a_reason(root):
     reasons = {
-        ("--quasi-static",): "inertia",
         ("--regeneration", "bus"): "flows back",
         ("--forces", "least_torque"): "ground forces",
     }
