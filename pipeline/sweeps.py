@@ -67,8 +67,6 @@ def read_axis(text: str, machine: Machine) -> Axis:
     """
     name, _, written = (part.strip() for part in text.partition("="))
     place = f"vary {one_line(text)}"
-    if not name or not written:
-        raise LegwattError(f"{place}: expected NAME=VALUES, such as 'speed=0.1:0.4:7 m/s'")
     key = f"{GAIT}{name}" if f"{GAIT}{name}" in gait_keys() else name
     units = {p.name: p.unit for p in machine.robot.spec.parameters.rows()}
     units |= {f"{component}.{p.name}": p.unit for component, p in machine.catalog.rows()}
@@ -78,39 +76,29 @@ def read_axis(text: str, machine: Machine) -> Axis:
     match = _WRITTEN.fullmatch(written)
     body, unit = match.groups() if match else (written, "")
     unit = unit or units.get(key, "")  # that of its file
-    axis = Axis(key, "" if unit == "1" else unit, _values(body, place))
+    axis = Axis(key, "" if unit == "1" else unit, _values(body))
     for value in axis.values:  # each by itself is one that ``--set`` takes; together may not be
         try:
             machine.with_values({key: axis.change(value)})
         except LegwattError as error:
-            raise LegwattError(f"{place}: {str(error).partition(': ')[2] or error}") from None
+            reason = str(error).partition(": ")[2] or error
+            form = "; expected NAME=FIRST:LAST:COUNT UNIT or A,B,C UNIT" * isinstance(value, str)
+            raise LegwattError(f"{place}: {reason}{form}") from None
     return axis
 
 
-def _values(body: str, place: str) -> tuple[Value, ...]:
-    """``FIRST:LAST:COUNT`` or ``A,B,C``, numbers or words."""
-    values: list[Value] = []
-    try:
-        if ":" in body:
-            low, high, count = body.split(":")
-            if not 2 <= int(count) <= MOST_CASES:
-                raise ValueError
-            values += [float(f"{x:.12g}") for x in np.linspace(float(low), float(high), int(count))]
-    except ValueError:
-        raise LegwattError(
-            f"{place}: expected FIRST:LAST:COUNT, two numbers and a count from 2 to {MOST_CASES}, "
-            "such as 'speed=0.1:0.4:7 m/s'"
-        ) from None
-    for part in body.split(",") if not values else ():
-        try:
-            values.append(float(part))
-        except ValueError:
-            values.append(part.strip())
-    if "" in values or len(set(values)) < len(values):
-        raise LegwattError(f"{place}: a value is empty or stands twice")
-    if not all(isinstance(value, str) or math.isfinite(value) for value in values):
-        raise LegwattError(f"{place}: expected finite numbers")
-    return tuple(values)
+def _values(body: str) -> tuple[Value, ...]:
+    """``FIRST:LAST:COUNT`` or ``A,B,C``, numbers or words; what is neither is a word."""
+    values: list[Value] = [*map(str.strip, body.split(","))]
+    with suppress(ValueError):
+        low, high, count = body.split(":")
+        if 2 <= int(count) <= MOST_CASES:
+            every = np.linspace(float(low), float(high), int(count))
+            values = [float(f"{x:.12g}") for x in every]
+    for k, value in enumerate(values):
+        with suppress(ValueError):
+            values[k] = float(value)
+    return tuple(dict.fromkeys(values))
 
 
 def rows_of_case(

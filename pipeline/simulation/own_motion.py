@@ -90,15 +90,14 @@ def _motion(table: pd.DataFrame, robot: Robot) -> Motion:
 
 def _numbers(table: pd.DataFrame, needed: list[str]) -> pd.DataFrame:
     """The columns that are needed and the base's pose where it is given, finite numbers all."""
-    pose, spare = [*PLACE, *ATTITUDE], [str(c) for c in table.columns if c not in needed]
+    pose = [*PLACE, *ATTITUDE]
+    needed += pose if not table.columns.intersection(pose).empty else []
+    spare = [str(column) for column in table.columns if column not in needed]
     for column in needed:
         if column not in table.columns:  # another joint's column is no hint
             hint = f"; {closest(column, spare)}" if spare else ""
             raise LegwattError(f"no column {column}{hint}")
-    given = [column for column in pose if column in table.columns]
-    if given and given != pose:
-        raise LegwattError(f"columns {', '.join(given)} alone; give all of {', '.join(pose)}")
-    values = table[[*needed, *given]].apply(pd.to_numeric, errors="coerce").astype(np.float64)
+    values = table[needed].apply(pd.to_numeric, errors="coerce").astype(np.float64)
     if len(values) < FEWEST_ROWS:
         raise LegwattError(f"{len(values)} rows; derivatives need {FEWEST_ROWS}")
     for row, k in np.argwhere(~np.isfinite(values.to_numpy())).tolist():

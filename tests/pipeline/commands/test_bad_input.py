@@ -67,7 +67,7 @@ COMMANDS = [
     (["init-actuator", "own", "--source", "x"], r"^missing: --"),
     (["components", "maxon_14886"], r"did you mean 'maxon_148867'"),
     (["sweep", "--vary", "sped=0.1,0.2 m/s"], r"did you mean 'speed'"),
-    (["sweep", "--vary", "speed=0.1:0.4 m/s"], r"expected FIRST:LAST:COUNT"),
+    (["sweep", "--vary", "speed=0.1:0.4 m/s"], r"expected NAME=FIRST:LAST:COUNT"),
     (["sweep", "--vary", "duty_factor=0.6,1.4"], r"must be above 0 to 1"),
     (["choose", "--pack", "catl_lfp"], r"'catl_lfp' states no voltage"),
     ([*WHERE, "--mapping", "none.toml"], r"none.toml"),

@@ -241,7 +241,7 @@ def test_what_is_no_motion_is_refused_with_one_line(hexapod, moved, tmp_path):
     trials = [
         (moved.drop(columns="lm__contact"), "no column lm__contact$"),
         (moved.rename(columns={"lm__contact": "lm__contakt"}), "did you mean 'lm__contakt'"),
-        (moved.assign(base__roll_rad=0.0), "columns base__roll_rad alone"),
+        (moved.assign(base__roll_rad=0.0), "no column base__x_m"),
         (moved[:5], "5 rows; derivatives need 6"),
         (moved.assign(**np.degrees(moved[angles])), "deg; .* in degrees they would fit"),
     ]
