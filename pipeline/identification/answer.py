@@ -651,7 +651,7 @@ def _candidates(
 ) -> Iterator[Candidate]:
     """Every name once: those found, what comes close to one of them, then all others."""
     wide = answer.found
-    d, weighed = wide.design, np.diag(wide.sums[0])
+    d, weighed = wide.design, wide.weights @ wide.design.squares
     seen: dict[Key, bool] = {}
     for t, columns in zip(d.terms, d.columns, strict=True):
         if not t.block or (t.bound == np.inf and isinstance(t.effect, Effect)):

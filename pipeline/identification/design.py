@@ -21,7 +21,7 @@ from actuators.arrays import Array, Index, Mask
 from actuators.errors import LegwattError
 from pipeline.effects.base import Effect, Place
 from pipeline.identification.settings import CHUNKS, MARGIN, SHARE
-from pipeline.identification.tolerances import Slope, Tolerance
+from pipeline.identification.tolerances import BodyStrain, Slope, Tolerance, inertial
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.equations import Left, OnLegs
@@ -296,6 +296,46 @@ class Equation:
         return float(np.sqrt(np.mean(floor[:, self.channel] ** 2)))
 
 
+class Grams:
+    """Sums of every equation over some columns, and what follows of all of them at once."""
+
+    def __init__(self, design: Design, ids: Index) -> None:
+        """Gather them; equations that most columns touch stand in one array, filled with zeros."""
+        n, parts, wide = ids.size, list[tuple[Index, Array]](), list[int]()
+        for k, (e, where) in enumerate(zip(design.equations, design.local[:, ids], strict=True)):
+            at = np.flatnonzero(where >= 0)
+            G = e.total[0][where[at][:, None], where[at]]
+            if 2 * at.size > n:
+                wide.append(k)
+                if at.size < n:
+                    G, own = np.zeros((n, n)), G
+                    G[at[:, None], at] = own
+            parts.append((at, G))
+        self.h = design.rights[:, ids]  #: X^T r, shape (E, n).
+        self._wide = np.array(wide, int)
+        self._flat = np.array([parts[k][1].ravel() for k in wide]).reshape(len(wide), n * n)
+        self._narrow = [(k, at, G) for k, (at, G) in enumerate(parts) if k not in wide]
+        self._last: tuple[bytes, Array, Array] | None = None
+
+    def weighted(self, weights: Array) -> tuple[Array, Array]:
+        """X^T X (n, n) and X^T r (n,) of all equations, each with a weight."""
+        key, n = weights.tobytes(), self.h.shape[1]
+        if self._last is None or self._last[0] != key:
+            H = (weights[self._wide] @ self._flat).reshape(n, n)
+            for k, at, G in self._narrow:
+                H[at[:, None], at] += weights[k] * G
+            self._last = key, H, weights @ self.h
+        return self._last[1:]
+
+    def traces(self, M: Array) -> Array:
+        """Of X^T X M of every equation, M symmetric (n, n), shape (E,)."""
+        out = np.empty(len(self.h))
+        out[self._wide] = self._flat @ M.ravel()
+        for k, at, G in self._narrow:
+            out[k] = np.vdot(G, M[at[:, None], at])
+        return out
+
+
 @dataclass(frozen=True, eq=False)
 class Design:
     """Everything that competes on some logs, about a point."""
@@ -309,10 +349,9 @@ class Design:
     predictions: tuple[Prediction, ...]  #: At the point, one per log.
     made: tuple[Made, ...] = ()  #: Columns on legs as they were made, one per log.
     kept_of: int = 0  #: Names that competed where all but those that stand are left away.
-    _parts: dict[bytes, list[tuple[Index, Array, Array]]] = field(default_factory=dict, init=False)
+    _grams: dict[bytes, Grams] = field(default_factory=dict, init=False)
     _standing: dict[tuple[int, ...], Index] = field(default_factory=dict, init=False)
     _within: dict[int, list[int]] = field(default_factory=dict, init=False)
-    _totals: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False)
 
     @property
     def size(self) -> int:
@@ -395,12 +434,8 @@ class Design:
     @cached_property
     def wide(self) -> Array:
         """Prior standard deviation of a name's columns, shape (K,): a torque as measured."""
-        out, square, effort = np.ones(self.size), np.zeros(self.size), np.zeros(self.size)
-        for e in self.equations:
-            G, _, _, n = e.total
-            own = np.diag(G)
-            square[e.ids] += own
-            effort[e.ids] += np.where(own > 0.0, n * e.effort**2, 0.0)
+        out, square = np.ones(self.size), self.squares.sum(axis=0)
+        effort = (self.totals[1] * [e.effort**2 for e in self.equations]) @ (self.squares > 0.0)
         live = square > 0.0
         out[live] = np.sqrt(effort[live] / square[live])
         return out
@@ -471,7 +506,7 @@ class Design:
         All names are equally likely; a nonlinear parameter pays what a coordinate that many rows
         tell does, where no column of its own pays.
         """
-        rows = 0.5 * np.log(max(float(np.mean([e.total[3] for e in self.equations])), 1.0))
+        rows = 0.5 * np.log(max(float(np.mean(self.totals[1])), 1.0))
         free = [
             len(t.free) - self.whole(k).size + self.columns[k].size if t.free else 0
             for k, t in enumerate(self.terms)
@@ -492,32 +527,62 @@ class Design:
         own = set(self.columns[number].tolist())
         return [k for k, e in enumerate(self.equations) if own & set(e.ids.tolist())]
 
-    def total(self, weights: Array) -> tuple[Array, Array]:
-        """X^T X (K, K) and X^T r (K,) of all chunks, every equation with a weight."""
-        key = weights.tobytes()
-        if key not in self._totals:
-            H, h = np.zeros((self.size, self.size)), np.zeros(self.size)
-            for e, w in zip(self.equations, weights, strict=True):
-                where = np.ix_(e.ids, e.ids) if e.ids.size < self.size else ...
-                H[where] += w * e.total[0]
-                h[e.ids] += w * e.total[1]
-            self._totals.clear()
-            self._totals[key] = H, h
-        return self._totals[key]
+    @cached_property
+    def local(self) -> Index:
+        """Of every column its number in every equation, -1 where it does not touch it, (E, K)."""
+        out = np.full((len(self.equations), self.size), -1)
+        for row, e in zip(out, self.equations, strict=True):
+            row[e.ids] = np.arange(e.ids.size)
+        return out
 
-    def parts(self, active: Index) -> list[tuple[Index, Array, Array]]:
-        """Of every equation the places of its columns among some, X^T X and X^T r of these."""
-        key = active.tobytes()
-        if key not in self._parts:
-            if len(self._parts) >= _KEPT:
-                self._parts.pop(next(iter(self._parts)))
-            where, self._parts[key] = np.full(self.size, -1), []
-            where[active] = np.arange(active.size)
-            for e in self.equations:
-                mine = np.flatnonzero(where[e.ids] >= 0)
-                own = e.total[0][np.ix_(mine, mine)], e.total[1][mine]
-                self._parts[key].append((where[e.ids[mine]], *own))
-        return self._parts[key]
+    @cached_property
+    def rights(self) -> Array:
+        """X^T r of every equation, shape (E, K)."""
+        return self._spread([e.total[1] for e in self.equations])
+
+    @cached_property
+    def squares(self) -> Array:
+        """Diagonals of X^T X of every equation, shape (E, K)."""
+        return self._spread([np.diag(e.total[0]) for e in self.equations])
+
+    def _spread(self, own: Sequence[Array]) -> Array:
+        out = np.zeros((len(self.equations), self.size))
+        for row, e, x in zip(out, self.equations, own, strict=True):
+            row[e.ids] = x
+        return out
+
+    @cached_property
+    def totals(self) -> Array:
+        """Of every equation r r and rows of all chunks, shape (2, E)."""
+        return np.array([e.total[2:] for e in self.equations]).reshape(-1, 2).T
+
+    def between(self, weights: Array, rows: Index, columns: Index) -> Array:
+        """X^T X of some columns (n,) with others (m,), every equation with a weight, (n, m)."""
+        out = np.zeros((rows.size, columns.size))
+        for e, w, at in zip(self.equations, weights, self.local, strict=True):
+            i, j = np.flatnonzero(at[rows] >= 0), np.flatnonzero(at[columns] >= 0)
+            own = w * e.total[0][at[rows[i]][:, None], at[columns[j]]]
+            out[(i[:, None], j) if own.shape != out.shape else ...] += own
+        return out
+
+    def apart(self, weights: Array, columns: Index) -> Array:
+        """X^T X of sets of columns (T, k), every equation with a weight, (T, k, k)."""
+        out = np.zeros((*columns.shape, columns.shape[1]))
+        for e, w, at in zip(self.equations, weights, self.local[:, columns], strict=True):
+            t = np.flatnonzero((at >= 0).any(axis=1))
+            own = at[t]
+            seen = (own[:, :, None] >= 0) & (own[:, None] >= 0)
+            out[t] += w * np.where(seen, e.total[0][own[:, :, None], own[:, None]], 0.0)
+        return out
+
+    def grams(self, ids: Index) -> Grams:
+        """Sums over some columns; those asked for last are kept."""
+        key = ids.tobytes()
+        if key not in self._grams:
+            if len(self._grams) >= _KEPT:
+                self._grams.pop(next(iter(self._grams)))
+            self._grams[key] = Grams(self, ids)
+        return self._grams[key]
 
     def extended(self, terms: Sequence[Term]) -> Design:
         """With more terms, about the files' model."""
@@ -643,9 +708,10 @@ def _columns(
         if own in made and not isinstance(term.effect, Slope):
             out.append(made[own])
             continue
-        out.append([])
+        bodies = _of_strains(data_set, base, term) if here is None else None
+        out.append(bodies or [])
         made[own] = out[-1]
-        for c in term.effect.coordinates:
+        for c in term.effect.coordinates if bodies is None else ():
             step = c.step * term.reach
             if isinstance(term.effect, Slope):
                 k = placed[term.effect.effect, term.place]
@@ -662,6 +728,24 @@ def _columns(
                 moved = term.effect.edit(base.model, term.place, x, term.shape)
             out[-1].append(_change(data_set, base, here, moved, step))
     return out
+
+
+def _of_strains(data_set: DataSet, base: Prediction, term: Term) -> list[dict[int, Array]] | None:
+    """Columns of a link's body by what torques show; None of other terms and where that varies."""
+    if not isinstance(term.effect, BodyStrain):
+        return None
+    model, size = base.model, len(term.effect.coordinates)
+    joint = model.carrier(term.place[0])
+    now = np.array(model.bodies.body(joint).strain or (0.0,) * size)
+    steps = np.diag([c.step for c in term.effect.coordinates])
+    law = inertial(model, term.place[0])
+    ten = np.asarray(np.linalg.solve(steps, law(now + steps) - law(now)).T, float)
+    seen = data_set.simulator.of_body(base, model.rigid.getJointId(joint), ten)
+    if seen is None:
+        return None
+    smooth, rows = data_set.measurement.smooth, data_set.rows
+    every = {j: smooth(x)[rows] for j, x in seen.items()}
+    return [{j: x[..., i] for j, x in every.items() if x[..., i].any()} for i in range(size)]
 
 
 def _change(

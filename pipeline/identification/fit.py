@@ -59,11 +59,15 @@ class Fit:
     @cached_property
     def active(self) -> Index:
         """Columns in use."""
-        ids, gone = self.offered, self.deviation <= NOTHING * self.design.unit
-        gone[self.design.of(self.names)] = False
-        if self.negative is not None:
-            gone |= self.negative
-        return np.asarray(ids[~gone[ids]])
+        live = self._live if self.negative is None else self._live & ~self.negative
+        return np.asarray(self.offered[live[self.offered]])
+
+    @cached_property
+    def _live(self) -> Mask:
+        """Columns but those of blocks that are nothing, shape (K,)."""
+        out = self.deviation > NOTHING * self.design.unit
+        out[self.design.of(self.names)] = True
+        return out
 
     @cached_property
     def offered(self) -> Index:
@@ -106,32 +110,28 @@ class Fit:
         return np.asarray(self.kappa / self.sigma**2)
 
     @cached_property
-    def sums(self) -> tuple[Array, Array]:
-        """Weighted X^T X (K, K) and X^T r (K,)."""
-        return self.design.total(self.weights)
+    def _sums(self) -> tuple[Array, Array]:
+        """Weighted X^T X and X^T r of what is offered."""
+        return self.design.grams(self.offered).weighted(self.weights)
 
     @cached_property
-    def parts(self) -> list[tuple[Index, Array, Array]]:
-        """By equation: places among the active columns, and their X^T X and X^T r."""
-        return self.design.parts(self.active)
+    def sums(self) -> tuple[Array, Array]:
+        """Weighted X^T X (n, n) and X^T r (n,) of the active columns."""
+        H, h = self._sums
+        return (
+            (H, h) if self._use.size == h.size else (H[self._use[:, None], self._use], h[self._use])
+        )
+
+    @cached_property
+    def _use(self) -> Index:
+        """Places of the active columns among what is offered."""
+        return np.searchsorted(self.offered, self.active)
 
     @cached_property
     def solved(self) -> tuple[Array, Array, Array]:
         """Cholesky factor of A over the active columns, their values, and b."""
-        H, h = self._weighted(self.active)
+        H, h = self.sums
         return *factored(H, h, self.prior), h
-
-    def _weighted(self, ids: Index) -> tuple[Array, Array]:
-        H, h = np.zeros((ids.size, ids.size)), np.zeros(ids.size)
-        for w, (at, G, own) in zip(self.weights, self.design.parts(ids), strict=True):
-            H[(at[:, None], at) if at.size < h.size else ...] += w * G
-            h[at] += w * own
-        return H, h
-
-    @cached_property
-    def _every(self) -> tuple[Array, Array]:
-        """Weighted X^T X and X^T r of what is offered."""
-        return self._weighted(self.offered)
 
     @cached_property
     def prior(self) -> Array:
@@ -159,10 +159,8 @@ class Fit:
         L, x, b = self.solved
         out = 0.5 * float(b @ x) - float(np.log(np.diag(L)).sum())
         out += 0.5 * float(np.log(self.prior).sum())
-        for e, w, k, s in zip(
-            self.design.equations, self.weights, self.kappa, self.sigma, strict=True
-        ):
-            out -= 0.5 * w * e.total[2] + k * e.total[3] * float(np.log(s))
+        square, rows = self.design.totals
+        out -= 0.5 * float(self.weights @ square) + float((self.kappa * rows) @ np.log(self.sigma))
         out += self.design.loose_cost(len(self.loose))
         own = self.design.of(self.names)
         if own.size and self.tails is not None:
@@ -172,10 +170,16 @@ class Fit:
     @cached_property
     def misfit(self) -> Array:
         """Sum of squares that every equation leaves, shape (E,)."""
-        out, x = [], self.solved[1]
-        for e, (at, G, h) in zip(self.design.equations, self.parts, strict=True):
-            out.append(max(float(e.total[2] - 2.0 * h @ x[at] + x[at] @ G @ x[at]), 0.0))
-        return np.array(out)
+        grams, x = self.design.grams(self.offered), self.x[self.offered]
+        left = self.design.totals[0] - 2.0 * grams.h @ x + grams.traces(np.outer(x, x))
+        return np.maximum(left, 0.0)
+
+    @cached_property
+    def determined(self) -> Array:
+        """Parameters that every equation determines, shape (E,)."""
+        C = np.zeros((self.offered.size,) * 2)
+        C[self._use[:, None], self._use] = self.covariance
+        return np.asarray(self.weights * self.design.grams(self.offered).traces(C))
 
     @cached_property
     def worth(self) -> float:
@@ -186,7 +190,8 @@ class Fit:
         out = self.evidence
         for k, e in enumerate(self.design.equations):
             if e.joint >= len(self.design.model.joints):
-                at, G, h = self.parts[k]
+                mine, at = self.among(e.ids)
+                G, h = e.total[0][mine[:, None], mine], e.total[1][mine]
                 A, b = self.solved[0] @ self.solved[0].T, self.solved[2].copy()
                 A[at[:, None], at] -= self.weights[k] * G
                 b[at] -= self.weights[k] * h
@@ -209,8 +214,8 @@ class Fit:
         """
         at = self.among(ids)[1]
         if not at.size:
-            own, rest = (np.searchsorted(self.offered, k) for k in (ids, self.active))
-            H, h = self._every
+            own, rest = np.searchsorted(self.offered, ids), self._use
+            H, h = self._sums
             W = scipy.linalg.solve_triangular(self.solved[0], H[rest[:, None], own], lower=True)
             g = h[own] - H[own[:, None], rest] @ self.solved[1]
             S = H[own[:, None], own] - W.T @ W
@@ -220,6 +225,17 @@ class Fit:
         M = np.eye(at.size) + C * (q - p)
         change = float(x @ ((q - p) * np.linalg.solve(M, x)))
         return 0.5 * float(np.log(q / p).sum() - np.linalg.slogdet(M)[1] - change)
+
+    @cached_property
+    def signs_stand(self) -> bool:
+        """Whether all have their signs, and what is left out for its sign would be against it."""
+        x, unsigned = self.solved[1], ~self.design.signed
+        if (x[unsigned[self.active]] < 0.0).any():
+            return False
+        assert self.negative is not None
+        out = np.flatnonzero((self.negative & self._live)[self.offered])
+        H, h = self._sums
+        return bool((h[out] <= H[out[:, None], self._use] @ x).all())
 
     def without(self, number: int) -> Fit:
         """The same with one name less; settle it."""
@@ -330,36 +346,39 @@ class Fit:
 
     def gains(self, offered: Sequence[int]) -> Array:
         """Rise of the evidence with each of some terms while scales and noise stay, (T,)."""
-        return self._gains(offered, self.sums[1])[0] + self.design.cost[list(offered)]
+        h = self.weights @ self.design.rights
+        return self._gains(offered, h)[0] + self.design.cost[list(offered)]
 
     def shares(self, offered: Sequence[int], columns: Index, x: Array) -> Array:
         """Of the squares of some columns at values (n,), beside this fit, what each term takes."""
-        h = self.sums[0][:, columns] @ x
+        d, every = self.design, np.arange(self.design.size)
+        h = d.between(self.weights, every, columns) @ x
         return 2.0 * self._gains(offered, h)[1] / self.beside(columns, x)
 
     def beside(self, columns: Index, x: Array) -> float:
         """Weighted squares of some columns at values (n,) that this fit does not take, at least."""
-        H = self.sums[0]
-        own = H[np.ix_(columns, columns)] @ x
-        h = H[np.ix_(self.active, columns)] @ x
+        d = self.design
+        own = d.between(self.weights, columns, columns) @ x
+        h = d.between(self.weights, self.active, columns) @ x
         taken = h @ scipy.linalg.cho_solve((self.solved[0], True), h)
         return max(float(x @ own - taken), 1e-300)
 
     def _gains(self, offered: Sequence[int], h: Array) -> Array:
         """Of a series by X^T y (K,): rise of the evidence, half of the squares taken, (2, T)."""
-        d, L, H = self.design, self.solved[0], self.sums[0]
+        d, L = self.design, self.solved[0]
         x = scipy.linalg.cho_solve((L, True), h[self.active])
         out, every = np.full((2, len(offered)), -np.inf), d.of(offered)
         where = np.full(d.size, -1)
         where[every] = np.arange(every.size)
-        W = scipy.linalg.solve_triangular(L, H[self.active[:, None], every], lower=True)
-        g = h[every] - H[every[:, None], self.active] @ x
+        H = d.between(self.weights, self.active, every)
+        W = scipy.linalg.solve_triangular(L, H, lower=True)
+        g = h[every] - x @ H
         sizes = np.array([d.columns[k].size for k in offered], int)
         for size in np.unique(sizes):
             some = np.flatnonzero(sizes == size)
             own = np.array([d.columns[offered[k]] for k in some.tolist()])
             V = np.moveaxis(W[:, where[own]], 0, 2)
-            S = H[own[:, :, None], own[:, None]] - V @ V.swapaxes(1, 2)
+            S = d.apart(self.weights, own) - V @ V.swapaxes(1, 2)
             out[:, some] = _gain(S, g[where[own]], d.narrow[own], d.wide[own], d.signed[own])
         return out
 
@@ -418,7 +437,7 @@ def _bound(design: Design, block: str, loose: frozenset[str]) -> float:
 def settled(fit: Fit, turns: int = _TURNS) -> Fit:
     """Scales, noise and signs at which the evidence is largest."""
     d = fit.design
-    rows = np.array([e.total[3] for e in d.equations])
+    rows = d.totals[1]
     blocks: dict[str, list[int]] = {}
     for k, t in enumerate(d.terms):
         # The slope of a nonlinear parameter is nothing where that converged, and not known to be.
@@ -426,9 +445,11 @@ def settled(fit: Fit, turns: int = _TURNS) -> Fit:
             blocks.setdefault(t.block, []).extend(d.columns[k].tolist())
     bounds = {b: _bound(d, b, fit.loose) for b in blocks}
     fit = replace(fit, scales={b: min(s, bounds.get(b, np.inf)) for b, s in fit.scales.items()})
-    fit, before = replace(fit, negative=None), -np.inf
+    before = -np.inf
     for turn in range(turns):
-        fit = _right_signs(replace(fit, tails=d.tail(np.arange(d.size), fit.x)))
+        if fit.names or fit.tails is not None:
+            fit = replace(fit, tails=d.tail(np.arange(d.size), fit.x) if fit.names else None)
+        fit = _right_signs(fit)
         if turn in _REVIEWED:
             fit = _reviewed(fit, bounds)
         variance = np.zeros(d.size)
@@ -446,8 +467,7 @@ def settled(fit: Fit, turns: int = _TURNS) -> Fit:
             # A block that is nothing approaches it slowly.
             scales[b] = float(np.clip(now * min(ratio, ratio**1.5), NOTHING, bounds[b]))
             change = max(change, abs(np.log(scales[b] / now)))
-        gamma = np.array([_determined(fit, k) for k in range(len(d.equations))])
-        spare = np.maximum(fit.kappa * rows - gamma, 0.1 * fit.kappa * rows + 1e-9)
+        spare = np.maximum(fit.kappa * rows - fit.determined, 0.1 * fit.kappa * rows + 1e-9)
         sigma = np.sqrt(fit.kappa * fit.misfit / spare)
         fit = replace(fit, scales=scales, sigma=np.maximum(sigma, np.maximum(fit.floor, 1e-12)))
         if change < 0.1 and abs(fit.evidence - before) < 0.1:
@@ -472,15 +492,12 @@ def _reviewed(fit: Fit, bounds: Mapping[str, float]) -> Fit:
     return fit
 
 
-def _determined(fit: Fit, k: int) -> float:
-    """Parameters that one equation determines."""
-    at, G, _ = fit.parts[k]
-    return float(fit.weights[k] * np.sum(G * fit.covariance[at[:, None], at]))
-
-
 def _right_signs(fit: Fit) -> Fit:
     """The estimate whose coordinates have their signs: those left out would come out against it."""
-    fit = replace(fit, negative=None)
+    if fit.negative is not None:
+        if fit.signs_stand:
+            return fit
+        fit = replace(fit, negative=None)
     L, x, _ = fit.solved
     signed = fit.design.signed[fit.active]
     if (x[~signed] >= 0.0).all():

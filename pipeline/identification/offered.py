@@ -252,12 +252,13 @@ def payload_terms(fit: Fit) -> Iterator[Term]:
         # Torques are linear in ten inertial parameters: their columns follow from the strains'.
         ids = design.columns[k]
         to_ten = np.linalg.pinv(slope(inertial(design.model, link), np.zeros(ids.size)))
-        H, h = fit.sums
+        h = fit.weights @ design.rights
         # What stays may take its part: the bodies of tight links, the common laws.
-        beside = H[np.ix_(fit.active, ids)] @ to_ten
+        beside = design.between(fit.weights, fit.active, ids) @ to_ten
         own = np.column_stack([beside, h[fit.active]])
         taken = cho_solve((fit.solved[0], True), own)
-        rest = to_ten.T @ H[np.ix_(ids, ids)] @ to_ten - beside.T @ taken[:, :-1]
+        rest = to_ten.T @ design.between(fit.weights, ids, ids) @ to_ten
+        rest = rest - beside.T @ taken[:, :-1]
         mass, *place = _payload(rest, to_ten.T @ h[ids] - beside.T @ taken[:, -1])
         if mass > 0.0 and np.abs(place).max() < 5.0:
             yield Term(EFFECTS["link_mass"], (link,), dict(zip(AXES, place, strict=True)))

@@ -434,8 +434,7 @@ def _curved(fit: Fit) -> tuple[Array, float]:
             bent.append((at, d.x0[c], ten, np.linalg.pinv(slope(ten, d.x0[c]))))
     if not bent:
         return fit.x, float(fit.weights @ fit.misfit)
-    H, h = fit.sums[0][np.ix_(ids, ids)], fit.sums[1][ids]
-    square = sum(w * e.total[2] for w, e in zip(fit.weights, d.equations, strict=True))
+    (H, h), square = fit.sums, float(fit.weights @ d.totals[0])
 
     def seen(x: Array) -> tuple[Array, float, float]:
         """Values that give the same torque by the columns, squares left, and with the prior's."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.effects.base import Coordinate, Place
-from pipeline.machine.machine import Bodies, MachineModel, changed_model, strained
+from pipeline.machine.machine import Bodies, MachineModel, changed_model, strained_parameters
 
 #: Coordinates of a body (`bodies.strained`) and their standard deviation at a scale of one: a
 #: rotation of the axes in which a body is measured leaves this as it is. A radius of gyration has
@@ -58,18 +58,18 @@ class BodyStrain(Tolerance):
 
 
 def inertial(model: MachineModel, link: str) -> Callable[[Array], Array]:
-    """The ten inertial parameters of a link's body in a model as its strain would make them."""
+    """The ten inertial parameters of a link's body in a model by its strains, each (..., 10)."""
     joint = model.carrier(link)
     bare = replace(model.bodies.body(joint), strain=())
     rigid = changed_model(model.robot.model, Bodies(((joint, bare),)))
-    body = rigid.inertias[rigid.getJointId(joint)]
-    return lambda x: np.asarray(strained(body, x.tolist()).toDynamicParameters())
+    ten = np.asarray(rigid.inertias[rigid.getJointId(joint)].toDynamicParameters())
+    return lambda x: strained_parameters(ten, x)
 
 
 def slope(law: Callable[[Array], Array], x: Array) -> Array:
     """Change of what follows from some numbers by each of them, central differences, (m, n)."""
     steps = 1e-4 * np.eye(x.size)
-    return np.stack([(law(x + s) - law(x - s)) / 2e-4 for s in steps], axis=1)
+    return np.asarray((law(x + steps) - law(x - steps)).T / 2e-4)
 
 
 class Resistance(Tolerance):

@@ -13,11 +13,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
-import scipy.linalg
 
 from actuators.arrays import Array, least_magnitude
 from actuators.chain import Chain, ChainResult, HoldingResult, held
@@ -185,6 +184,11 @@ Vector = tuple[float, float, float]
 _LEAST = 1e-6
 #: Radius that a point has at least [m].
 _POINT = 1e-2
+#: Places of xx, xy, yy, xz, yz, zz in a symmetric matrix, those of a stretch among strains, and
+#: moments of inertia by second moments.
+_SIX = np.array([[0, 1, 3], [1, 2, 4], [3, 4, 5]])
+_STRETCH = np.array([[0, 4, 5], [4, 1, 6], [5, 6, 2]])
+_MOMENTS = np.outer([1, 0, 1, 0, 0, 1], [1, 0, 1, 0, 0, 1]) - np.eye(6)
 
 
 @dataclass(frozen=True)
@@ -261,28 +265,28 @@ def strained(body: pin.Inertia, strain: Sequence[float]) -> pin.Inertia:
     slender link may lie off its axis as far as along it: motors and wires sit beside it. `strain`:
     of the symmetric E the entries xx, yy, zz, then a, then of E xy, xz, yz, and d.
     """
-    ten = tuple(np.asarray(body.toDynamicParameters()).tolist())
-    return pin.Inertia.FromDynamicParameters(np.array(_strained(ten, tuple(strain))))
+    ten = np.asarray(body.toDynamicParameters())
+    return pin.Inertia.FromDynamicParameters(strained_parameters(ten, np.array(strain)))
 
 
-@lru_cache(maxsize=4096)
-def _strained(ten: tuple[float, ...], strain: tuple[float, ...]) -> tuple[float, ...]:
-    P = np.asarray(pin.PseudoInertia.FromDynamicParameters(np.array(ten)).toMatrix())
-    if P[3, 3] <= 0.0:
-        return ten
-    c = P[:3, 3] / P[3, 3]
-    size, axes = np.linalg.eigh(P[:3, :3] - P[3, 3] * np.outer(c, c))
+def strained_parameters(ten: Array, strain: Array) -> Array:
+    """The ten inertial parameters of a body as `strained`, for strains (..., 10), (..., 10)."""
+    m = ten[0]
+    if m <= 0.0:
+        return np.broadcast_to(ten, strain.shape)
     # A file may state a body that cannot be, or a point: the nearest that can.
-    size = np.maximum(size, _LEAST * max(float(size[-1]), _POINT**2 * P[3, 3]))
-    xx, yy, zz, a, xy, xz, yz, *d = strain
-    stretch = scipy.linalg.expm(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])) @ axes
-    m = np.exp(a) * P[3, 3]
-    c = c + np.sqrt(size[-1] / P[3, 3]) * np.array(d)
-    P = np.empty((4, 4))
-    P[:3, :3] = np.exp(a) * (stretch * size) @ stretch.T + m * np.outer(c, c)
-    P[:3, 3] = P[3, :3] = m * c
-    P[3, 3] = m
-    return tuple(pin.PseudoInertia.FromMatrix(P).toDynamicParameters().tolist())
+    c = ten[1:4] / m
+    size, axes = np.linalg.eigh(np.linalg.solve(_MOMENTS, ten[4:])[_SIX] - m * np.outer(c, c))
+    size = np.maximum(size, _LEAST * max(float(size[-1]), _POINT**2 * m))
+    grown = np.exp(strain[..., 3])
+    log, turn = np.linalg.eigh(strain[..., _STRETCH])
+    stretch = (turn * np.exp(log)[..., None, :]) @ turn.swapaxes(-1, -2) @ axes
+    m, c = grown * m, c + np.sqrt(size[-1] / m) * strain[..., 7:]
+    first = m[..., None] * c
+    second = grown[..., None, None] * (stretch * size) @ stretch.swapaxes(-1, -2)
+    second = second + first[..., None] * c[..., None, :]
+    six = second[..., *np.tril_indices(3)] @ _MOMENTS
+    return np.concatenate([m[..., None], first, six], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,6 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from scipy.ndimage import shift
 
 from actuators.arrays import Array
 from actuators.chain import Chain, moved
@@ -20,6 +19,7 @@ from actuators.shaft import ShaftSeries
 from pipeline.dynamics.contact_forces import FeetOnGround
 from pipeline.dynamics.residual import body_columns, by_body, of_other_bodies
 from pipeline.effects.base import Measured
+from pipeline.logs.filters import late
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import inverse_dynamics
@@ -86,6 +86,21 @@ class RigidBodies:
             self._linear = motion, machine, out, by_body(body_columns(rigid, motion))
         return out
 
+    def regressor(self, machine: MachineModel, motion: Course) -> Array | None:
+        """By body (B, N, nv, 10) on a fixed base, of joints' motion; None where it is too large."""
+        robot = machine.robot
+        if robot.floating:
+            return None
+        q, v, a = robot.configuration(motion[0]), *map(robot.tangent, motion[1:])
+        course = (q, v, a)
+        for _ in range(3):
+            known, tilt = self._linear, machine.bodies.tilt
+            same = known is not None and known[1].bodies.tilt == tilt
+            if known is not None and same and all(map(np.array_equal, known[0], course)):
+                return known[3]
+            self._of_bodies(machine, course)
+        return None
+
     def _of_ground(self, machine: MachineModel, q: Array, wrench: Array) -> Array:
         """What the ground's forces put into the joints, shape (N, J) [N*m]."""
         m = self.measurement
@@ -139,6 +154,7 @@ class Simulator:
         #: What drives show that carry the bodies of a prediction under its steady forces, (N, J).
         self._drives: tuple[Prediction, Array] | None = None
         self._shifted: tuple[tuple[float, ...], Array] | None = None
+        self._slopes: tuple[Prediction, list[dict[int, Array]] | None] | None = None
 
     @cached_property
     def measured(self) -> Measured:
@@ -305,6 +321,57 @@ class Simulator:
         delta = new.effort - base.effort
         return {k: delta[:, k] for k in new.computed if delta[:, k].any()}
 
+    def of_body(self, base: Prediction, number: int, ten: Array) -> dict[int, Array] | None:
+        """What other inertial parameters of one body change of a prediction, (N, C, n) by joint.
+
+        None where a torque shows at other joints or times than it acts, so that each is simulated.
+
+        Args:
+            base: The prediction.
+            number: Of the joint that carries the body, in Pinocchio's order.
+            ten: Changes, shape (10, n).
+        """
+        m = self.measurement
+        regressor = self._bodies.regressor(base.model, (base.q, m.v, m.a))
+        shown = None if regressor is None else self._by_load(base)
+        if regressor is None or shown is None:
+            return None
+        torque = (regressor[number - 1] @ ten)[:, base.model.robot.velocity_index]
+        out: dict[int, Array] = {}
+        for i in np.flatnonzero(torque.any(axis=(0, 2))).tolist():
+            for k, own in shown[i].items():
+                out[k] = out.get(k, 0.0) + own[..., None] * torque[:, i, None]
+        return {k: self._sampled(base.model.actuators[k], x) for k, x in out.items()}
+
+    def _by_load(self, base: Prediction) -> list[dict[int, Array]] | None:
+        """What sensors of joints see per torque at each joint, (N, C); None as in `of_body`."""
+        if self._slopes is None or self._slopes[0] is not base:
+            self._slopes = base, None
+            every, model = base.model.actuators, base.model
+            if not any(a.is_elastic or a.heating for a in every):
+                pairs = [{a.name, a.coupled_to} for a in every if a.coupled_to]
+                coupled = [model.index(name) for name in sorted(set().union(*pairs))]
+                step = 1e-3 * (1e-3 + np.abs(base.torque).max(axis=0)) * np.eye(len(every))
+                out = []
+                for i in range(len(every)):
+                    joints = coupled if i in coupled else [i]
+                    up, down = (
+                        self._before_sensors(model, base.q, base.torque + way * step[i], joints)
+                        for way in (1.0, -1.0)
+                    )
+                    out.append({k: (up[k] - down[k]) / (2.0 * step[i, i]) for k in joints})
+                self._slopes = base, out
+        return self._slopes[1]
+
+    def _before_sensors(
+        self, model: MachineModel, q: Array, torque: Array, joints: Sequence[int]
+    ) -> dict[int, Array]:
+        """Channels of some joints (N, C) that are coupled to no others, before their sensors."""
+        motor, out = np.zeros_like(torque), {}
+        for k in sorted(joints, key=lambda k: not model.actuators[k].coupled_to):
+            motor[:, k], out[k], _ = self._shown(model, k, q, torque, motor)
+        return out
+
     def _moves_bodies(self, model: MachineModel, near: MachineModel, changed: set[int]) -> bool:
         """Whether bodies move or weigh otherwise."""
         if model.robot is not near.robot or model.bodies != near.bodies:
@@ -362,6 +429,19 @@ class Simulator:
         self, model: MachineModel, k: int, q: Array, torque: Array, motor: Array
     ) -> tuple[Array, Array]:
         """Motor torque at the joint side (N,) and effort channels (N, C) of one joint."""
+        m, a = self.measurement, model.actuators[k]
+        at_joint, out, drop = self._shown(model, k, q, torque, motor)
+        out = self._sampled(a, out)
+        if drop is not None:
+            i = m.channels.index("voltage")
+            out[:, i] += drop * a.gains.get("voltage", 1.0)
+        out[:, 0] += a.effort_offset
+        return at_joint, out
+
+    def _shown(
+        self, model: MachineModel, k: int, q: Array, torque: Array, motor: Array
+    ) -> tuple[Array, Array, Array | None]:
+        """The same before sensors, without the drop R I that a log's current tells, (N,)."""
         m, a, drives = self.measurement, model.actuators[k], model.drivetrains
         load = self._load(model, k, q, torque)
         motion = [drives.turned(k, x) for x in (m.q, m.v, m.a)]
@@ -382,18 +462,18 @@ class Simulator:
         if "torque" not in m.channels:
             shown, drop = self._electrical(a, k, shaft_torque, speed)
         out = np.stack([shown[channel] for channel in m.channels], axis=1)
+        return at_joint, out, drop if both else None
+
+    def _sampled(self, a: Chain, out: Array) -> Array:
+        """Channels (N, C, ...) of a joint as its sensors log them: late, and by their gains."""
+        m = self.measurement
         if a.delay:
             for piece in m.pieces:
                 t = m.time[piece]
                 if t.size > 3:
-                    rows = a.delay * (t.size - 1) / (t[-1] - t[0])  # the ends keep their value
-                    late = [shift(x, rows, mode="nearest") for x in out[piece].T]
-                    out[piece] = np.stack(late, axis=1)
-        if both:
-            out[:, m.channels.index("voltage")] += drop
-        out *= [a.gains.get(channel, 1.0) for channel in m.channels]
-        out[:, 0] += a.effort_offset
-        return at_joint, out
+                    out[piece] = late(out[piece], a.delay * (t.size - 1) / (t[-1] - t[0]))
+        gains = np.array([a.gains.get(channel, 1.0) for channel in m.channels])
+        return out * gains.reshape(-1, *(1,) * (out.ndim - 2))
 
     def _electrical(
         self, a: Chain, k: int, torque: Array, speed: Array
