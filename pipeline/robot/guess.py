@@ -67,16 +67,12 @@ def find_limbs(
     out = {
         n: round(float(np.linalg.norm(f.placement.translation)), 9) for n, (f, _) in links.items()
     }
+    supports = {n: list(model.supports[f.parentJoint])[_ROOT + 1 :] for n, (f, _) in links.items()}
+    outward = sorted(links, key=lambda n: (len(supports[n]), out[n]))
+    ends = [k for k in range(_ROOT + 1, model.njoints) if not list(model.children[k])]
     chains = [
-        [
-            name
-            for joint in list(model.supports[end])[_ROOT + 1 :]
-            for name in sorted(
-                (n for n, (f, _) in links.items() if f.parentJoint == joint), key=lambda n: out[n]
-            )
-        ]
-        for end in range(_ROOT + 1, model.njoints)
-        if not list(model.children[end])
+        [n for n in outward if supports[n] and supports[n][-1] in model.supports[end]]
+        for end in ends
     ]
     moved = [name for chain in chains for name in chain]
     chosen, reason = [known("feet: no link moves of name", f, moved, where) for f in feet], "named"
@@ -97,13 +93,7 @@ def find_limbs(
         heights = [float(links[name][1][2]) for name in (*chosen, *links)]
         low = min(heights[: len(chosen)], default=0.0) + _LOW * max(float(np.ptp(heights)), 1e-9)
         chosen = [name for name, height in zip(chosen, heights, strict=False) if height <= low]
-    joints = [
-        tuple(
-            str(model.names[j])
-            for j in list(model.supports[links[foot][0].parentJoint])[_ROOT + 1 :]
-        )
-        for foot in chosen
-    ]
+    joints = [tuple(str(model.names[j]) for j in supports[foot]) for foot in chosen]
     tangled = _tangled(chosen, joints)
     few = (
         f"feet found: {', '.join(chosen) or 'none'}, and a statically stable gait needs three on "

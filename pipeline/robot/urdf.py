@@ -83,10 +83,6 @@ def parse_urdf(text: str, where: str, *, floating: bool) -> pin.Model:
         LegwattError: Something that Pinocchio's reader does not understand or passes over.
     """
     root = parse_elements(text, where)
-    for limit in root.iterfind("joint/limit"):
-        for key in ("effort", "velocity"):
-            if limit.get(key, "").strip().startswith("-"):
-                raise LegwattError(f"{where}: <limit {key}='{limit.get(key)}'> may not be negative")
     base = [pin.JointModelFreeFlyer()] if floating else []
     said: list[str] = []
     model = None
