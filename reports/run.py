@@ -111,7 +111,7 @@ def write_reports(
     """
     judgement, word = judged(machine)
     said = [word] if word else []
-    tables = tables | (judgement.tables if judgement is not None else {})
+    tables = {**tables, **(judgement.tables if judgement is not None else {})}
     about: dict[str, Any] = {}
     with staged(folder, "reports", inputs=machine.inputs, said=meta, about=about) as out:
         about |= write_tables(tables, out)
@@ -137,7 +137,7 @@ def _write_summary(
     given: Machine, judged: Judgement, tables: Mapping[str, DataFrame], folder: Path
 ) -> None:
     """Write ``index.html`` of the paper's robot; its figures are those of `reports.run`."""
-    study = judged.by.results
+    study = judged.results
     first = judged.tables["conclusions"].filter(_FIRST, axis="index").to_dict("index")
     more = facts(given, tables) | {"whose": motors_text(given.motors, "the paper's")}
     write_page(
@@ -171,8 +171,8 @@ def _first_lines(judged: Judgement, tables: Mapping[str, DataFrame]) -> list[str
         count=rows[met]["role"].value_counts().to_dict(),
         hold=holds.sum(),
         sentences=len(holds),
-        study=judged.by.results,
+        study=judged.results,
         known=said.filter(_FIRST[:2], axis="index").to_dict("index"),
         price=judged.price,
-        word=judged.by.word,
+        word=judged.word,
     )

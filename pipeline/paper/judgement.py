@@ -12,8 +12,9 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,16 +51,21 @@ _ALTERNATIVE = "alternatives."
 _SHOWN = 3
 
 
-class Basis(NamedTuple):
-    """What a run may be judged by."""
+class Judgement(NamedTuple):
+    """Ours against the paper's, and what it was judged by."""
 
     results: Mapping[str, Any] | None  #: The fit's study; None where it is of other numbers.
     catalog: Catalog  #: The paper's own alternatives among the run's.
     word: str  #: What to say of actuators and numbers that differ; empty where none does.
+    #: By the name of their file; rows of `conclusions` are labelled by what they compute.
+    tables: Mapping[str, pd.DataFrame] = MappingProxyType({})
+    #: What the fit asks of the planetary gear's constant friction: `friction_mNm`, its `heat_J` in
+    #: the printed leg in one cycle, and what that leg draws, `leg_J`.
+    price: Mapping[str, float] = MappingProxyType({})
 
 
-def basis(given: Machine) -> Basis | str | None:
-    """What the run may be judged by, or why not at all, in words; None for any other robot."""
+def basis(given: Machine) -> Judgement | str | None:
+    """What a run may be judged by, or why not at all, in words; None for any other robot."""
     study = json.loads((STUDY / "fitted.json").read_text(encoding="utf-8"))
     spec, stored = given.robot.spec, study["numbers"]
     if spec.path.name != study["robot"]:
@@ -99,7 +105,7 @@ def basis(given: Machine) -> Basis | str | None:
             f"not the calibration's: {', '.join(differ[:_SHOWN])}{more}; what is compared with the "
             "paper was computed anew, the fit's intervals are left out"
         )
-    return Basis(None if differ else study, catalog, "; ".join(said))
+    return Judgement(None if differ else study, catalog, "; ".join(said))
 
 
 def fingerprint(spec: RobotSpec, catalog: Catalog) -> Fingerprint:
@@ -152,18 +158,6 @@ _NAMES = {
 }
 
 
-@dataclass(frozen=True)
-class Judgement:
-    """Ours against the paper's."""
-
-    by: Basis  #: What it was judged by.
-    #: By the name of their file; rows of `conclusions` are labelled by what they compute.
-    tables: dict[str, pd.DataFrame]
-    #: What the fit asks of the planetary gear's constant friction: `friction_mNm`, its `heat_J` in
-    #: the printed leg in one cycle, and what that leg draws, `leg_J`.
-    price: Mapping[str, float]
-
-
 def judged(machine: Machine) -> tuple[Judgement | None, str]:
     """A run held against the paper, where it may be; what is to be said of that, often nothing."""
     by = basis(machine)
@@ -174,7 +168,7 @@ def judged(machine: Machine) -> tuple[Judgement | None, str]:
     return judge(machine.robot, by, samples=machine.options.samples), by.word
 
 
-def judge(robot: Robot, by: Basis, *, samples: int = 751) -> Judgement:
+def judge(robot: Robot, by: Judgement, *, samples: int = 751) -> Judgement:
     """Judge the robot and its actuators as they stand, with so many samples per half period."""
     fitted = by.results is not None
     part = robot_part(robot.spec, samples)
@@ -193,7 +187,7 @@ def judge(robot: Robot, by: Basis, *, samples: int = 751) -> Judgement:
         "heat_J": float(printed_leg(heat).sum()),
         "leg_J": float(found["irreversible"].drawn[0, PRINTED]),
     }
-    return Judgement(by, tables, price)
+    return by._replace(tables=tables, price=price)
 
 
 def _with_study(table: str, rows: pd.DataFrame, *, fitted: bool) -> pd.DataFrame:

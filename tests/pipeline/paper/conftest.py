@@ -8,7 +8,7 @@ import pytest
 
 from actuators.loading.build import Catalog, load_catalog
 from pipeline.paper.hexapod import RobotPart, robot_part
-from pipeline.paper.judgement import STUDY, Basis, Judgement, judge
+from pipeline.paper.judgement import STUDY, Judgement, judge
 from pipeline.paper.published import Published, load_published
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec, load_robot_file
@@ -43,4 +43,4 @@ def study() -> dict[str, Any]:
 @pytest.fixture(scope="session")
 def judgement(hexapod: Robot, catalog: Catalog, study: dict[str, Any]) -> Judgement:
     """Of the files as they are."""
-    return judge(hexapod, Basis(study, catalog, ""), samples=151)
+    return judge(hexapod, Judgement(study, catalog, ""), samples=151)

@@ -14,7 +14,6 @@ from actuators.loading.build import CATALOG, Catalog, load_catalog
 from actuators.parameters import to_si
 from pipeline.paper.hexapod import computed, outcomes
 from pipeline.paper.judgement import (
-    Basis,
     Judgement,
     basis,
     comparisons,
@@ -48,7 +47,7 @@ def test_every_printed_value_is_reproduced_or_contradicted(rows, published):
 
 
 def test_fig_21_crosses_where_both_pairs_draw_the_same(part, judgement):
-    found = outcomes(part.demand, judgement.by.catalog)
+    found = outcomes(part.demand, judgement.catalog)
     tables = fig_21(found, fitted=False)
     lines = {name: own for name, own in tables["energy_per_minute"].groupby("alternative")}
     (even,) = tables["break_even"]["standing_fraction"]
@@ -86,7 +85,7 @@ def test_sentences_of_section_iv_a_hold_but_two(judgement):
 
 def test_every_sentence_of_section_v_can_fail(part, judgement):
     """Holds for ours, and does not where one number is turned the other way."""
-    found = outcomes(part.demand, judgement.by.catalog)
+    found = outcomes(part.demand, judgement.catalog)
     ours = computed(part, found)
     turned = {
         "walking_ratio_rotor": ("walking_ratio_rotor", 5.0),
@@ -122,7 +121,7 @@ def given(root: Path, *options: str, robot: Path | None = None) -> Machine:
 def test_after_a_change_the_comparison_is_computed_anew_and_the_rest_left_out(root):
     run = given(root, "--set", "harmonic_drive.load=0.1", "--samples", "51")
     by = basis(run)
-    assert isinstance(by, Basis)
+    assert isinstance(by, Judgement)
     assert by.results is None
     assert by.word.startswith("not the calibration's: harmonic_drive.load;")
     tables = judge(run.robot, by, samples=run.options.samples).tables
