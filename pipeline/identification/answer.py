@@ -353,6 +353,7 @@ class Rival:
     behind: float  #: Logarithm of how much less likely the log is with it, at least.
     ahead: float  #: ... and how much likelier, at least.
     excluded: bool  #: Whether the log excludes it.
+    fewer: bool  #: Whether it has fewer numbers.
     fit: Fit  #: With it, on the columns of the answer.
 
 
@@ -388,32 +389,41 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
         apart = richer or fit.sure(other, touched)[0] > SURE
         if twin or behind < 2.0 * EXCLUDED:
             excluded = behind > EXCLUDED and apart and not twin
-            out.append(Rival(key, behind, other.rise(fit), excluded, linear))
-    if bodies:
-        out += _traded(less, fit)
+            fewer = other.active.size < fit.active.size
+            out.append(Rival(key, behind, other.rise(fit), excluded, fewer, linear))
+    out += _traded(less, fit, one)
     out.sort(key=lambda r: r.behind)
     open_ = [r for r in out if not r.excluded][:LARGEST_CLASS]
     return [r for r in out if r.excluded or r in open_]
 
 
-def _traded(less: Fit, fit: Fit) -> Iterator[Rival]:
-    """Names that the log shows beside the files' bodies and that loose ones take over.
+def _traded(less: Fit, fit: Fit, one: Told) -> Iterator[Rival]:
+    """Names that the log shows beside the files' bodies and that those of the answer take over.
 
     Of a scale and the body of a pendulum, say, a log shows the product. Laws of links are bodies.
 
     Args:
-        less: The fit with the files' bodies.
-        fit: With loose ones.
+        less: The fit without the name.
+        fit: With it.
+        one: A name that changes bodies; any other has none.
     """
-    d, held = fit.design, replace(less, sigma=fit.sigma)
-    every, links = offered(fit, frozenset()), d.model.robot.links
+    d, held, links = fit.design, replace(less, sigma=fit.sigma), fit.design.model.robot.links
+    changed = {t.place[0] for t in d.terms if t.block in fit.loose} if one.key == BODIES else set()
+    changed |= {part for part in one.key[1] if part in links}
+    # All joints have such laws: they cost nothing.
+    laws = [k for k, t in enumerate(d.terms) if t.block and t.effect.name in _LIKE_BODIES]
+    at = {(links[link],) for link in changed}
+    laws = [k for k in laws if d.terms[k].place in at and not fit.x[d.columns[k]].any()]
+    every = offered(fit, frozenset()) if one.key == BODIES else []
     numbers = [k for k in every if d.terms[k].place[0] not in links]
-    for k, gain in zip(numbers, fit.gains(numbers).tolist(), strict=True):
+    gains = [*fit.gains(numbers).tolist(), *(0.0 for _ in laws)]
+    for k, gain in zip([*numbers, *laws], gains, strict=True):
         columns = d.columns[k]
         # As large as in practice.
         shown, left = (f.beside(columns, d.narrow[columns]) for f in (held, fit))
-        if left < 1.0 and shown > COVER**2:
-            yield Rival(d.terms[k].key, -gain, gain, False, replace(fit, names=(*fit.names, k)))
+        if left < (SHARE * shown if k in laws else 1.0) and shown > COVER**2:
+            more = fit if k in laws else replace(fit, names=(*fit.names, k))
+            yield Rival(d.terms[k].key, -gain, gain, False, False, more)
 
 
 def _foreseen(less: Fit, fit: Fit, one: Told) -> tuple[list[Move], list[Move]]:
@@ -442,7 +452,11 @@ def _foreseen(less: Fit, fit: Fit, one: Told) -> tuple[list[Move], list[Move]]:
         wide = replace(less, loose=less.loose | {block}, scales={**less.scales, block: LOOSE})
         share = 1.0 - wide.beside(columns, x) / less.beside(columns, x)
         twins.append((share, less.names, wide.loose))
-    twins = sorted((m for m in twins if m[0] > SHARED), key=lambda m: -m[0])
+    # Whatever else changes a loose link is a body of that kind.
+    loose = {t.place[0] for t in d.terms if t.block in fit.loose} if bodies else set[str]()
+    kinds = {k for k in numbers if d.terms[k].place[:1] and d.terms[k].place[0] in loose}
+    twins = [m for m in twins if m[0] > SHARED or kinds & set(m[1])]
+    twins.sort(key=lambda m: -m[0])
     return likely, twins[:_RIVALS]
 
 
@@ -551,15 +565,20 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
 def _likeliest(answer: Answer) -> tuple[Answer, dict[Key, list[Rival]]]:
     """An answer, or what stands in the place of one of its names where that is likelier.
 
+    With fewer numbers anything likelier does. What has been left is not come back to.
+
     Returns:
         The answer and the rivals of its names.
     """
+    left = set[Key]()
     for turn in range(_FOLLOWED + 1):
         rivals = {one.key: rivals_of(answer, one) for one in answer.told}
-        priced = [r for one in answer.told if one.priced for r in rivals[one.key]]
-        best = max(priced, key=lambda r: r.ahead, default=None)
-        if best is None or best.ahead < EXCLUDED or turn == _FOLLOWED:
+        every = [(r, t.key) for t in answer.told for r in rivals[t.key]]
+        ahead = [pair for pair in every if pair[0].key not in left]
+        best, gone = max(ahead, key=lambda pair: pair[0].ahead, default=(None, BODIES))
+        if best is None or best.ahead < (0.0 if best.fewer else EXCLUDED) or turn == _FOLLOWED:
             break
+        left.add(gone)
         fit = polished(settled(about(best.fit, _nothing(best.fit))))
         answer = answered(fit)
     return answer, rivals

@@ -391,8 +391,8 @@ class Design:
         """
         if number not in self._within:
             wide, place, out = self.columns[number], self.terms[number].place, []
-            for k, own in enumerate(self.columns):
-                if own.size >= wide.size or self.terms[k].place != place:
+            for k, (own, term) in enumerate(zip(self.columns, self.terms, strict=True)):
+                if own.size >= wide.size or term.place != place or term.moves:
                     continue
                 ids = np.concatenate([wide, own])
                 H = np.zeros((ids.size, ids.size))
@@ -504,13 +504,11 @@ class Design:
         """Logarithm of the prior of every term as a name, shape (T,).
 
         All names are equally likely; a nonlinear parameter pays what a coordinate that many rows
-        tell does, where no column of its own pays.
+        tell does until columns of its own are made: one that the log does not show pays nothing.
         """
         rows = 0.5 * np.log(max(float(np.mean(self.totals[1])), 1.0))
-        free = [
-            len(t.free) - self.whole(k).size + self.columns[k].size if t.free else 0
-            for k, t in enumerate(self.terms)
-        ]
+        moving = {t.moves for t in self.terms}
+        free = [0 if t.key in moving else len(t.free) for t in self.terms]
         return np.array([self.name_cost - rows * count for count in free])
 
     @cached_property

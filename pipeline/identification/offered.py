@@ -62,6 +62,10 @@ TRAVELS: Final = (3e-4, 1e-3, 3e-3, 1e-2)
 _FINER: Final = (2.0 ** np.linspace(-0.75, 0.75, 7), 2.0 ** np.linspace(-0.15, 0.15, 7))
 Reversals = Mapping[str, Mapping[str, float]]
 NOTHING_KNOWN: Final[Reversals] = MappingProxyType({})
+#: Of a payload, where a log does not show it: no robot carries more than itself, robots reach about
+#: a metre, and a thing that is mounted has a radius of gyration of some centimetres.
+_REACH: Final = 1.0  # [m]
+_GYRATION: Final = 0.05  # [m]
 #: Places about a link's joint from which that of a payload is looked for [m].
 _AROUND: Final = np.vstack([np.zeros(3), *(0.2 * np.eye(3)), *(-0.2 * np.eye(3))])
 
@@ -245,6 +249,7 @@ def payload_terms(fit: Fit) -> Iterator[Term]:
     """Payloads of the last links, where what is left of a fit would have them."""
     design = fit.design
     number = {t.key: k for k, t in enumerate(design.terms) if t.block}
+    most = sum(body.mass for body in design.model.robot.model.inertias)
     for link in last_links(design.model):
         k = number.get((BodyStrain.name, (link,)))
         if k is None:
@@ -259,25 +264,29 @@ def payload_terms(fit: Fit) -> Iterator[Term]:
         taken = cho_solve((fit.solved[0], True), own)
         rest = to_ten.T @ design.between(fit.weights, ids, ids) @ to_ten
         rest = rest - beside.T @ taken[:, :-1]
-        mass, *place = _payload(rest, to_ten.T @ h[ids] - beside.T @ taken[:, -1])
+        mass, *place = _payload(rest, to_ten.T @ h[ids] - beside.T @ taken[:, -1], most)
         if mass > 0.0 and np.abs(place).max() < 5.0:
             yield Term(EFFECTS["link_mass"], (link,), dict(zip(AXES, place, strict=True)))
 
 
-def _payload(H: Array, h: Array) -> list[float]:
+def _payload(H: Array, h: Array, most: float) -> list[float]:
     """Mass [kg] and place [m] of the payload by which a log is likeliest, (4,).
 
     Args:
         H: X^T X of ten inertial parameters, what stands beside them taken out.
         h: X^T r.
+        most: Mass of the robot [kg].
     """
     size, axes = np.linalg.eigh(0.5 * (H + H.T))
     kept = size > 1e-9 * max(float(size[-1]), 1e-300)
+    # A pendulum, say, does not show where along its axis, nor a mass apart from its extent.
+    known = np.array([most, *(_REACH,) * 3, most * _GYRATION**2])
     A = np.sqrt(size[kept])[:, None] * axes[:, kept].T
     b = axes[:, kept].T @ h / np.sqrt(size[kept])
 
     def left(p: Array) -> Array:
-        return np.asarray(A @ (point_mass(p[0], p[1:4]) + p[4] * ALIKE) - b)
+        rest = A @ (point_mass(p[0], p[1:4]) + p[4] * ALIKE) - b
+        return np.append(rest, p / known)
 
     # Free of each other the ten parameters tell mass and first moment, where the log shows both.
     ten = axes[:, kept] @ (b / np.sqrt(size[kept]))

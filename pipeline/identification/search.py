@@ -345,6 +345,7 @@ def about(
     point = _point(fit)
     standing = {p.term.key: p.term for p in point if not p.term.block}
     names = {d.terms[k].key for k in fit.names}
+    forms = {(d.terms[k].key, *d.terms[k].shape) for k in fit.names}
     coupled = {joint for t in standing.values() if couples(t) for joint in t.place}
     terms: list[Term] = []
     for k, t in enumerate(d.terms):
@@ -352,7 +353,9 @@ def about(
             continue
         if k in fit.names:
             terms.append(replace(standing.get(t.key, t), reach=1.0))
-        elif t.block or not (alone or t.key in names or (couples(t) and coupled & set(t.place))):
+        elif t.block or not (
+            alone or (t.key, *t.shape) in forms or (couples(t) and coupled & set(t.place))
+        ):
             terms.append(t)
     varied = []
     for key in names:
