@@ -414,7 +414,7 @@ def _traded(less: Fit, fit: Fit, one: Told) -> Iterator[Rival]:
     laws = [k for k, t in enumerate(d.terms) if t.block and t.effect.name in _LIKE_BODIES]
     at = {(links[link],) for link in changed}
     laws = [k for k in laws if d.terms[k].place in at and not fit.x[d.columns[k]].any()]
-    every = offered(fit, frozenset()) if one.key == BODIES else []
+    every = offered(fit, frozenset()) if changed else []
     numbers = [k for k in every if d.terms[k].place[0] not in links]
     gains = [*fit.gains(numbers).tolist(), *(0.0 for _ in laws)]
     for k, gain in zip([*numbers, *laws], gains, strict=True):
@@ -579,8 +579,10 @@ def _likeliest(answer: Answer) -> tuple[Answer, dict[Key, list[Rival]]]:
         if best is None or best.ahead < (0.0 if best.fewer else EXCLUDED) or turn == _FOLLOWED:
             break
         left.add(gone)
-        fit = polished(settled(about(best.fit, _nothing(best.fit))))
-        answer = answered(fit)
+        again = answered(polished(settled(about(best.fit, _nothing(best.fit)))))
+        if best.ahead < EXCLUDED and best.key not in {t.key for t in again.told}:
+            break
+        answer = again
     return answer, rivals
 
 

@@ -170,6 +170,8 @@ def _far(fit: Fit) -> list[Term]:
         own = moved[d.columns[k]]
         if isinstance(term.effect, BodyStrain) and np.abs(own).max(initial=0.0) > 0.1:
             out.append(term)
+        if isinstance(term.effect, Slope) and (np.abs(own) > fit.spread[d.columns[k]]).any():
+            out.append(term)
         if isinstance(term.effect, Effect) and not term.effect.additive:
             steps = np.array([c.step for c in term.effect.coordinates])
             bent = (np.abs(own) > BENT * steps).any()

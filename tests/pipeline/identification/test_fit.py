@@ -63,7 +63,11 @@ def test_what_moves_with_a_nonlinear_parameter_comes_and_goes_with_its_name():
     moved = {c[0] for t, c in zip(d.terms, d.columns, strict=True) if t.effect.name == "slope"}
     assert len(moved & set(fit.active)) == 3
     assert moved.isdisjoint(less.active)
-    assert d.cost[k] == d.name_cost  # their own columns pay for them
+    assert (
+        d.cost[k] == d.name_cost
+    )  # their own columns pay for them, and nothing where none is seen
+    assert d.terms[-1].moves == d.terms[k].key
+    assert replace(d, terms=d.terms[:-1]).cost[k] == d.name_cost
     assert told.share == pytest.approx(fit.sure(less, d.touched(k))[1], rel=1e-3)
 
 

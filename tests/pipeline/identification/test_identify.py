@@ -7,7 +7,11 @@ import pytest
 
 from pipeline.effects.base import effect_named
 from pipeline.identification.answer import answered, identify
+from pipeline.identification.design import Term, make_data_sets, make_design
+from pipeline.identification.fit import settled, start_fit
+from pipeline.identification.offered import block_terms
 from pipeline.identification.results import APPROXIMATE, CONFIRMED
+from pipeline.identification.search import about, is_far
 from pipeline.logs.log import TEST
 from pipeline.simulation.machine import read_machine
 from pipeline.simulation.predict import Simulator
@@ -153,16 +157,9 @@ def test_what_only_proves_has_no_say(motion):
         assert one.values == pytest.approx(other.values, rel=1e-4)
 
 
-@pytest.mark.parametrize(
-    ("name", "place", "values"),
-    [
-        ("effort_gain", "pendulum_joint__torque_Nm", {"gain": 1.2}),
-        ("rotor_inertia", "pendulum_joint", {"added": 1.5e-3}),
-        ("position_offset", "pendulum_joint", {"angle": 0.1}),
-    ],
-)
-def test_what_only_a_product_shows_is_one_class_at_one_level(motion, tmp_path, name, place, values):
-    urdf = tmp_path / "pendulum.urdf"
+def swinging(motion, folder, name, place, values):
+    """A pendulum, and its log with an effect hidden in it."""
+    urdf = folder / "pendulum.urdf"
     urdf.write_text(PENDULUM.read_text().replace("1e-6", "1e-3"))
     nominal = read_machine(urdf).model
     one = {key: getattr(motion, key)[:, :1] for key in ("q", "v", "a", "mask")}
@@ -170,8 +167,43 @@ def test_what_only_a_product_shows_is_one_class_at_one_level(motion, tmp_path, n
     log = replace(motion, joints=nominal.joints, channels=("torque",), **one)
     truth = effect_named(name).apply(nominal, (place,), values)
     noise = NOISE * np.random.default_rng(3).standard_normal((len(log), 1, 1))
-    log = replace(log, effort=Simulator(log).predict(truth).effort + noise)
+    return nominal, replace(log, effort=Simulator(log).predict(truth).effort + noise)
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "values"),
+    [
+        ("effort_gain", "pendulum_joint__torque_Nm", {"gain": 1.2}),
+        ("rotor_inertia", "pendulum_joint", {"added": 1.5e-3}),
+        ("position_offset", "pendulum_joint", {"angle": 0.1}),
+        # Where along its axis, and how far it turns about itself, a pendulum does not show.
+        ("link_mass", "pendulum_link", {"mass": 0.05, "x": 0.02, "y": 0.01, "z": -0.06}),
+    ],
+)
+def test_what_only_a_product_shows_is_one_class_at_one_level(motion, tmp_path, name, place, values):
+    nominal, log = swinging(motion, tmp_path, name, place, values)
     (first,) = (f for f in identify(nominal, [log]).found if f.kept)
     assert first.level == APPROXIMATE
     told = {first.effect, *(effect for effect, _ in first.rivals)}
     assert {name, "rigid_body_parameters"} <= told
+
+
+def test_a_payload_goes_where_a_log_shows_it_and_nowhere_else(motion, tmp_path):
+    """Its columns of a pendulum hold what it would change along the link, about the files."""
+    place, at = "pendulum_link", {"mass": 0.05, "x": 0.02, "y": 0.01, "z": -0.06}
+    nominal, log = swinging(motion, tmp_path, "link_mass", place, at)
+    sets, start = make_data_sets([log]), {"x": 0.0, "y": 0.0, "z": -0.1}
+    payload = Term(effect_named("link_mass"), (place,), start)
+    design = make_design(
+        nominal, sets, [*block_terms(nominal, sets[0].simulator.measured), payload]
+    )
+    fit = settled(replace(start_fit(design, log.noise[0]), names=(len(design.terms) - 1,)))
+    fit = settled(about(fit))
+    assert is_far(fit)
+    for _ in range(4):
+        fit = settled(about(fit))
+    assert not is_far(fit)
+    (k,) = fit.names
+    mass, there = fit.x[fit.design.columns[k]][0], fit.design.terms[k].shape
+    moments = [mass * there[axis] for axis in "xyz"]
+    assert moments == pytest.approx([0.05 * 0.02, 0.0, 0.05 * -0.06], rel=0.02, abs=1e-5)
