@@ -128,7 +128,8 @@ class LowPass:
         flat = x.reshape(x.shape[0], -1)
         out = np.empty((len(kernels), *flat.shape))
         for piece in pieces:
-            own = _extended(flat[piece], self.half)
+            ends = (self.half, self.half), (0, 0)
+            own = np.pad(flat[piece], ends, mode="reflect", reflect_type="odd")
             for k, kernel in enumerate(kernels):
                 out[k, piece] = _summed(own, kernel[:, None])
         return out.reshape(len(kernels), *x.shape)
@@ -155,17 +156,6 @@ def by_piece(function: Callable[[Any], Any], x: Any, pieces: Sequence[slice]) ->
 def _summed(x: Array, kernel: Array) -> Array:
     """Sums of a series (N, C) over a kernel (K, 1) where it lies inside."""
     return np.asarray(scipy.signal.oaconvolve(x, kernel, mode="valid", axes=0))
-
-
-def _extended(x: Array, half: int) -> Array:
-    """Continue columns (N, C) beyond both ends by point symmetry about their end values.
-
-    Where the kernel is longer than the series, what lies beyond its mirror image stays constant.
-    """
-    reach = min(half, len(x) - 1)
-    before, after = 2.0 * x[:1] - x[reach:0:-1], 2.0 * x[-1:] - x[-2 : -reach - 2 : -1]
-    y = np.concatenate([before, x, after])
-    return y if reach == half else np.pad(y, ((half - reach, half - reach), (0, 0)), mode="edge")
 
 
 def choose_cutoff(
@@ -263,17 +253,10 @@ class Grid:
     def under(cls, time: Array, dt: float, *, bridge: float = 0.0) -> Self:
         """Lay a grid of steps `dt` [s] under a log; steps up to `bridge` [s] are no gaps.
 
-        The log's own rows where each piece is uniform to within `JITTER_IGNORED` steps, else one
-        to interpolate on, through the first time.
+        Every piece has its log's own rows where these are even to within `JITTER_IGNORED` steps.
         """
         cuts = np.flatnonzero(np.diff(time) > max(GAP * dt, bridge)) + 1
-        parts = np.split(time, cuts)
-        if not all(_is_uniform(part, dt) for part in parts):
-            first = [int(np.ceil((part[0] - time[0]) / dt - 1e-9)) for part in parts]
-            last = [int(np.floor((part[-1] - time[0]) / dt + 1e-9)) for part in parts]
-            grids = [time[0] + dt * np.arange(a, b + 1) for a, b in zip(first, last, strict=True)]
-            each = zip(grids, parts, strict=True)
-            parts = [np.clip(grid, part[0], part[-1]) for grid, part in each if grid.size]
+        parts = [_even(part, dt) for part in np.split(time, cuts)]
         whole = np.concatenate(parts)
         right = np.clip(np.searchsorted(time, whole), 1, time.size - 1)
         nearer = time[right] - whole < whole - time[right - 1]
@@ -302,12 +285,14 @@ class Grid:
         return np.asarray(apart & (time[after] != self.time) | outside)
 
 
-def _is_uniform(time: Array, dt: float) -> bool:
-    # A rate that is off by a little is no jitter: compare with the piece's own step too.
-    own = (time[-1] - time[0]) / max(time.size - 1, 1)
-    steps = [dt, own] if abs(own / dt - 1.0) < 1e-3 else [dt]
-    rows = np.arange(time.size)
-    return any(np.abs(time - time[0] - s * rows).max() <= JITTER_IGNORED * dt for s in steps)
+def _even(time: Array, dt: float) -> Array:
+    """Times of a piece [s], or where these are uneven, steps `dt` from the first one."""
+    span = float(time[-1] - time[0])
+    own = span / max(time.size - 1, 1)
+    step = own if abs(own / dt - 1.0) < 1e-3 else dt  # a rate that is off by a little
+    grid = time[0] + step * np.arange(int(span / step + 1e-9) + 1)
+    even = grid.size == time.size and np.abs(grid - time).max() <= JITTER_IGNORED * dt
+    return time if even else np.minimum(grid, time[-1])
 
 
 def rows_of(piece: slice) -> int:
