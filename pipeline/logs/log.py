@@ -204,9 +204,7 @@ class Recording:
     @property
     def clock(self) -> Array:
         """Times of rows that hold a position: others may come between, at their own [s]."""
-        told = np.zeros(len(self), dtype=np.bool_)
-        for joint in self.joints:
-            told |= np.isfinite(self.position_of(joint))
+        told = np.isfinite(self.position).any(axis=1)
         return self.time[told] if np.count_nonzero(told) > 1 else self.time
 
     def column(self, joint: str, quantity: str) -> Array | None:

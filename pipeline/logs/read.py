@@ -324,8 +324,7 @@ def _slope(motor: Array, joint: Array) -> float | None:
     good = np.isfinite(motor) & np.isfinite(joint)
     if good.sum() < 2 or np.ptp(joint[good]) < _LEAST_MOTION:
         return None
-    x = joint[good] - joint[good].mean()
-    return float(x @ (motor[good] - motor[good].mean()) / (x @ x))
+    return float(np.polyfit(joint[good], motor[good], 1)[0])
 
 
 def _stand_still(frame: Columns, plan: ReadingPlan) -> dict[str, str]:
