@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, Final, Self
 
@@ -221,24 +221,16 @@ def smoother_noise(x: Array, ok: Mask, pieces: Sequence[slice], lowpass: LowPass
         Standard deviation up to half the rate, shape (C,); NaN where fewer than 50 samples are
         good. A filter lets its first gain of it pass.
     """
-    outer, inner, gain = _band_above(lowpass)
-    # Passed twice: what little of the motion the first pass lets through is gone after the second.
-    rests = [x[piece] for piece in pieces]
-    for _ in range(2):
-        rests = [outer.smooth(rest) - inner.smooth(rest) for rest in rests]
-    rest, good = np.abs(np.vstack(rests)), np.vstack([ok[piece] for piece in pieces])
-    seen = [r[g] for r, g in zip(rest.T, good.T, strict=True)]
-    sigma = np.array([np.median(r) if r.size >= 50 else np.nan for r in seen])
-    return np.asarray(sigma / _MAD / gain)
-
-
-@cache
-def _band_above(lowpass: LowPass) -> tuple[LowPass, LowPass, float]:
-    """Filters of which the difference passes the band, and what of noise passes it twice."""
     outer = LowPass(lowpass.rate, min(3.0 * lowpass.cutoff, LARGEST_SHARE * lowpass.rate))
     inner = LowPass(lowpass.rate, min(1.5 * lowpass.cutoff, 0.8 * outer.cutoff))
     band = np.pad(outer.kernels[0], inner.half - outer.half) - inner.kernels[0]
-    return outer, inner, float(np.sqrt((np.convolve(band, band) ** 2).sum()))
+    gain = float(np.sqrt((np.convolve(band, band) ** 2).sum()))
+    # Passed twice: what little of the motion the first pass lets through is gone after the second.
+    for _ in range(2):
+        x = outer.smooth(x, pieces) - inner.smooth(x, pieces)
+    seen = [np.abs(r[g]) for r, g in zip(x.T, ok.T, strict=True)]
+    sigma = np.array([np.median(r) if r.size >= 50 else np.nan for r in seen])
+    return np.asarray(sigma / _MAD / gain)
 
 
 @dataclass(frozen=True)

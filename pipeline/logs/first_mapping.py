@@ -208,8 +208,7 @@ def _tell_unit(g: Guess, x: Array, position: Guess | None, expected: Expected) -
         margin = _BEYOND * (most - least)
         limits = (least - margin, most + margin) if np.isfinite(margin) else (-_TURNS, _TURNS)
         fits = [u for u, f in _ANGLES.items() if limits[0] <= f * low and f * high <= limits[1]]
-        g.sure, g.unit = bool(fits), fits[0] if fits else "rad"
-        g.unit *= g.unit != "rad" or not fits
+        g.sure, g.unit = bool(fits), "rad" if not fits else "" if "rad" in fits else "deg"
         g.why = f"from {low:.4g} to {high:.4g}: "
         g.why += f"{' or '.join(fits)} by the joint's limits" if fits else "no radians, no degrees"
         g.why += "; or a motor's angle" * ("rad" not in fits)

@@ -25,11 +25,7 @@ from numpy.typing import NDArray
 from actuators.arrays import Array
 from actuators.errors import LegwattError, known
 from pipeline.logs.checks import judge, refuse_repeats
-from pipeline.logs.filters import (
-    LARGEST_SHARE,
-    LowPass,
-    rows_of,
-)
+from pipeline.logs.filters import LARGEST_SHARE, LowPass, rows_of
 from pipeline.logs.log import (
     TEST,
     TIME,
@@ -46,14 +42,7 @@ from pipeline.logs.log import (
 )
 from pipeline.logs.mapping import Mapping as MappingFile
 from pipeline.logs.read import read_log
-from pipeline.logs.reduce import (
-    AT_REST,
-    LONGEST_KERNEL,
-    STANCE,
-    Settings,
-    choose_settings,
-    reduced,
-)
+from pipeline.logs.reduce import AT_REST, LONGEST_KERNEL, STANCE, Settings, choose_settings, reduced
 from pipeline.logs.speeds import MOST_TAKEN, changes, narrowed, near_rest
 from pipeline.robot.robot import Robot
 

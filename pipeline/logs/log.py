@@ -88,25 +88,22 @@ class Expected:
         }
 
 
-def _limits(values: Array) -> Array:
-    # Pinocchio writes "no limit" as the largest double, and URDFs often as zero.
-    return np.where((np.abs(values) > 1e100) | (values == 0.0), np.inf, values)
-
-
 def expected_of_robot(robot: Robot, *, ratio: Array | None = None) -> Expected:
     """Names and limits of a robot; a foot goes by its leg's or its frame's name.
 
     `ratio`: motor angle per joint angle, shape (J,).
     """
     model, own = robot.model, robot.velocity_index
-    lower, upper = robot.limits
+    (lower, upper), effort = robot.limits, model.effortLimit[own]
+    # Pinocchio writes "no limit" as the largest double, and URDFs often as zero.
+    effort = np.where((np.abs(effort) > 1e100) | (effort == 0.0), np.inf, effort)
     gravity = float(np.linalg.norm(model.gravity.linear))
     return Expected(
         robot=robot.spec.name,
         joints=robot.joints,
         lower=lower,
         upper=upper,
-        effort_limit=_limits(model.effortLimit[own]),
+        effort_limit=effort,
         ratio=None if ratio is None else np.asarray(ratio, dtype=np.float64),
         feet=robot.leg_names,
         foot_alias={leg.foot: leg.name for leg in robot.spec.legs},

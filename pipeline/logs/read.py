@@ -17,7 +17,7 @@ import pandas as pd
 
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError, closest, known, one_line
-from actuators.parameters import dimension, from_si
+from actuators.parameters import dimension, from_si, to_si
 from pipeline.logs.formats import Source, open_source, sha256
 from pipeline.logs.log import (
     BY_MODEL,
@@ -279,12 +279,14 @@ def _in_si(plan: ReadingPlan, data: MappingType[str, Array]) -> Columns:
             at = out[TIME] + rule.late
             values = np.interp(at, out[TIME], values, left=np.nan, right=np.nan)
         if columns[name].quantity == "temperature" and _live(values):  # cells between may be empty
-            told = np.isfinite(values)
-            values = np.asarray(np.interp(out[TIME], out[TIME][told], values[told]))
+            ok = np.isfinite(values)
+            values = np.asarray(np.interp(out[TIME], out[TIME][ok], values[ok]))
         out[name] = values
     for name, quantity in plan.mapping.constants.items():
         target = columns[name]
-        out.setdefault(target.name, np.full(n, from_si(quantity.si, target.unit)))
+        out.setdefault(
+            target.name, np.full(n, from_si(to_si(quantity.value, quantity.unit), target.unit))
+        )
     return out
 
 
