@@ -48,7 +48,7 @@ HIDDEN = {
     "time_delay": (("effort channels",), {"delay": 0.008}),
 }
 #: Of kinds of place that no other fast test tries.
-QUICK = ("link_mass", "effort_gain", "time_delay")
+QUICK = ("link_mass", "effort_gain", "time_delay", "parallel_spring")
 
 
 @pytest.fixture(scope="module")

@@ -51,38 +51,30 @@ def given(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Machine:
     return load(robot_file(root, tmp_path_factory.mktemp("own"), OWN)).walking(samples=51)
 
 
-def test_current_is_torque_over_own_ratio_and_own_constant(given):
-    standing = given.stand(given.chains())
-    ratio, constant = np.full(18, 400.0), np.full(18, 30.186992e-3)
-    second = [k for k, name in enumerate(given.robot.joints) if name.endswith("_joint_2")]
-    ratio[second], constant[second] = 160.0, 60e-3
-    np.testing.assert_allclose(
-        standing.holding["ideal"].current, standing.demand.torque[0] / ratio / constant, rtol=1e-12
-    )
-
-
-def test_the_gear_next_to_the_motor_meets_the_total_ratio(given):
-    stock = {c: load_catalog().parameter(f"{c}.ratio").value for c in ("harmonic_drive", "hypoid")}
-    for name, kept, free in (
-        ("reversible", "harmonic_drive", "timing_belt"),
-        ("irreversible", "hypoid", "planetary"),
-    ):
-        drives = given.own.actuators(name)
-        assert not isinstance(drives, Chain)
-        joint = drives.joints[given.robot.joints.index("lf_joint_2")]
-        ratios = {e.name: e.gearing for e in joint.elements if e.gearing != 1.0}
-        assert ratios == pytest.approx({kept: stock[kept], free: 160.0 / stock[kept]})
-
-
-def test_as_built_every_joint_takes_what_its_own_alternative_takes(given):
-    chains = given.chains()
-    assert list(chains) == ["ideal", "rotor", "reversible", "irreversible", AS_BUILT]
+def test_a_joint_of_its_own_takes_what_its_ratio_and_its_constant_say(given):
+    """As built every joint takes what its own option takes."""
+    chains, joints = given.chains(), given.robot.joints
     walking, standing = given.walk(chains), given.stand(chains)
+    second = np.array([name.endswith("_joint_2") for name in joints])
+    ratio, constant = np.where(second, 160.0, 400.0), np.where(second, 60e-3, 30.186992e-3)
+    expected = standing.demand.torque[0] / ratio / constant
+    np.testing.assert_allclose(standing.holding["ideal"].current, expected, rtol=1e-12)
+    assert list(chains) == ["ideal", "rotor", "reversible", "irreversible", AS_BUILT]
     drawn = {name: stage_energies(r)["el"][0] for name, r in walking.results.items()}
-    for k, joint in enumerate(given.robot.joints):
+    for k, joint in enumerate(joints):
         alone = "rotor" if joint.endswith("_1") or joint == "rm_joint_3" else "reversible"
         assert drawn[AS_BUILT][k] == pytest.approx(drawn[alone][k], rel=1e-12)
         assert standing.holding[AS_BUILT].power[k] == standing.holding[alone].power[k]
+    # The gear next to the motor meets the total ratio.
+    geared = (
+        ("reversible", "harmonic_drive", "timing_belt"),
+        ("irreversible", "hypoid", "planetary"),
+    )
+    for name, kept, free in geared:
+        joint = given.own.actuators(name).joints[joints.index("lf_joint_2")]
+        ratios = {e.name: e.gearing for e in joint.elements if e.gearing != 1.0}
+        stock = load_catalog().parameter(f"{kept}.ratio").value
+        assert ratios == pytest.approx({kept: stock, free: 160.0 / stock})
 
 
 JOINT = '[[actuators.joint]]\njoints = ["rm_joint_2"]\n'
@@ -130,7 +122,7 @@ def test_a_catalogue_without_the_ideal_or_with_one_option_walks(root, tmp_path):
     text = file.read_text(encoding="utf-8")
     start, end = (text.index(f"[{name}]\n") for name in ("reversible", "irreversible"))
     file.write_text(text[start:end].replace("reversible", "geared"), encoding="utf-8")
-    machine = load(root / "urdf/hexapod.toml", actuators=folder)
+    machine = load(robot_file(root, tmp_path, '[actuators]\nfolder = "ours"\n'))
     energy = lw.walk(machine, samples=51).energy
     assert set(energy["alternative"]) == {"geared"}
     file.write_text(text + text[start:end].replace("[reversible", f"[{AS_BUILT}"), "utf-8")
