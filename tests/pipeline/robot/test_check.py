@@ -122,11 +122,8 @@ def test_what_fails_is_named(parts, failing):
     ],
 )
 def test_inertia_is_that_of_a_body(moments, products, wrong):
-    (finding,) = [
-        f
-        for f in judged(link("b", moments=moments, products=products))
-        if f.check == "inertia possible"
-    ]
+    every = judged(link("b", moments=moments, products=products))
+    (finding,) = (f for f in every if f.check == "inertia possible")
     assert finding.passed is not bool(wrong)
     assert wrong in finding.detail
 
@@ -181,11 +178,9 @@ def test_a_mimic_joint_is_held_outside_legs_and_a_floating_one_fails_unless_fixe
 )
 def test_limits_leave_a_joint_something_to_do(lower, upper, outcome):
     limit = f'effort="1" velocity="1" lower="{lower}" upper="{upper}"'
-    found = [
-        f for f in judged(BASE, link(), joint("base", "a", limit=limit)) if f.check == "limits"
-    ]
-    said = ["fails" if not f.passed else "note" if f.note else "good" for f in found]
-    assert said == [outcome]
+    every = judged(BASE, link(), joint("base", "a", limit=limit))
+    (found,) = (f for f in every if f.check == "limits")
+    assert ("fails" if not found.passed else "note" if found.note else "good") == outcome
 
 
 @pytest.mark.parametrize(("share", "near"), [(0.0049, True), (0.0051, False), (-0.0051, False)])

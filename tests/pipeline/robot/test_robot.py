@@ -1,5 +1,7 @@
 """A loaded robot: joints in no leg, edges of its numbers, its own motors, what is refused."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 
@@ -72,18 +74,11 @@ def test_what_cannot_be_loaded(tmp_path, old, new, message):
     ],
 )
 def test_edges_of_what_a_built_robot_can_have(hexapod, values, message):
-    rows = [
-        p.model_copy(update={"value": values[p.name], "bounds": None, "interval": None})
-        if p.name in values
-        else p
-        for p in hexapod.spec.parameters.rows()
-    ]
-    parameters = ParameterSet(tuple(rows), "here")
-    if not message:
-        check_parameters(parameters, "hexapod", "here")
-        return
-    with pytest.raises(LegwattError, match=message):
-        check_parameters(parameters, "hexapod", "here")
+    changed = {name: {"value": x, "bounds": None, "interval": None} for name, x in values.items()}
+    rows = hexapod.spec.parameters.rows()
+    every = tuple(p.model_copy(update=changed.get(p.name, {})) for p in rows)
+    with pytest.raises(LegwattError, match=message) if message else nullcontext():
+        check_parameters(ParameterSet(every, "here"), "hexapod", "here")
 
 
 def test_a_file_that_extends_another_keeps_what_it_does_not_say(root, tmp_path):
@@ -113,15 +108,12 @@ def test_a_robot_is_known_by_its_name_and_all_of_its_joints():
 
 
 def test_every_known_folder_loads_is_in_the_table_and_states_where_numbers_come_from():
-    folders = sorted(path.name for path in KNOWN.iterdir() if path.is_dir())
     table = read_toml(TABLE)
-    assert sorted(table) == folders
-    for name in folders:
-        catalog = load_catalog(KNOWN / name)
-        joints = table[name].get("joint", ())
-        own = {table[name]["alternative"]}
-        own |= {joint["alternative"] for joint in joints if "alternative" in joint}
-        assert set(catalog.alternatives) == {"ideal"} | own
+    assert sorted(table) == sorted(path.name for path in KNOWN.iterdir() if path.is_dir())
+    for name, own in table.items():
+        catalog, joints = load_catalog(KNOWN / name), own.get("joint", ())
+        every = {one["alternative"] for one in (own, *joints) if "alternative" in one}
+        assert set(catalog.alternatives) == {"ideal"} | every
         assert all(number.source for _, number in catalog.rows())
 
 

@@ -134,20 +134,16 @@ def test_a_payload_weighs_on_the_feet_and_a_spring_adds_to_the_demand(machine, c
     assert not np.delete(added, column).any()
 
 
-def test_a_found_friction_costs_in_the_actuator_it_was_found_against(machine):
+def test_a_found_friction_costs_in_the_actuator_it_was_found_against_and_motors_in_each(machine):
     rubbing = with_effect(machine, FRICTION)
-    own = rubbing.own.every
-    changed = {name for name, chain in own.items() if rubbing.chains()[name] is not chain}
-    assert changed == {"reversible"}
+    every = rubbing.own.every.items()
+    assert [name for name, chain in every if rubbing.chains()[name] is not chain] == ["reversible"]
     change = energy_change(machine, rubbing)
     assert set(change.dropna().index) == {"ideal", "reversible"}
     assert change.loc["ideal", "cycle_J"] == change.loc["ideal", "cycle_J_after"]
     row = change.loc["reversible"]
     assert row["cycle_J_after"] > row["cycle_J"]
     assert row["standing_W_after"] < row["standing_W"]
-
-
-def test_motors_count_in_every_alternative(machine):
     weak = ("torque_constant_error", JOINT, {"relative": -0.2})
     geared = energy_change(machine, with_effect(machine, weak, "rotor")).drop(index="ideal")
     assert (geared["cycle_J_after"] > geared["cycle_J"]).all()
@@ -214,16 +210,16 @@ def test_a_gait_written_out_demands_what_the_gait_demands(hexapod, tmp_path, gai
 
 
 def test_an_arm_on_a_stand_needs_no_contacts(root):
-    robot = load_robot(load_robot_file(root / "urdf" / "leg.toml"))
-    time = np.linspace(0.0, 2.0, 201)
+    robot, time = (
+        load_robot(load_robot_file(root / "urdf" / "leg.toml")),
+        np.linspace(0.0, 2.0, 201),
+    )
     q = 0.2 * np.sin(np.pi * time)
-    columns = {f"{joint}__position_rad": q for joint in robot.joints}
-    (segment,) = read_motion(pd.DataFrame({"time_s": time, **columns}), robot).segments
-    np.testing.assert_allclose(
-        segment.acceleration[:, 0], -(np.pi**2) * q, atol=1e-5
-    )  # at the ends, too
-    (demand,) = motion_demand(robot, Motion((segment,))).segments
-    assert np.isfinite(demand.torque).all()
+    columns = {"time_s": time} | {f"{joint}__position_rad": q for joint in robot.joints}
+    (segment,) = read_motion(pd.DataFrame(columns), robot).segments
+    expected = -(np.pi**2) * q  # at the ends, too
+    np.testing.assert_allclose(segment.acceleration[:, 0], expected, atol=1e-5)
+    assert np.isfinite(motion_demand(robot, Motion((segment,))).segments[0].torque).all()
 
 
 #: Column, rows and what stands there instead, and the words of the refusal.
