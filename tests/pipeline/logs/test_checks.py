@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.errors import LegwattError
-from pipeline.logs.checks import judge, refuse_repeats
+from pipeline.logs.checks import glitches, judge, quantum, refuse_repeats
 from pipeline.logs.log import Expected, Finding, Recording, refuse
 from tests.pipeline.logs.made import made_log, motion
 
@@ -183,6 +183,21 @@ def test_samples_that_jump_away_and_back_are_left_out(two_joints, at, length):
     bad[rows] = True
     assert np.array_equal(np.isnan(quality[1].position[:, 0]), bad)
     assert np.isfinite(quality[1].position[:, 1]).all()
+
+
+def test_a_jump_at_rest_is_judged_by_the_pace_about_it():
+    x = np.append(np.arange(400.0), np.full(400, 400.0))
+    x[480] += 8.0  # within twelve times the pace of the fast part
+    assert np.flatnonzero(glitches(x, np.ones(800, np.bool_), 0.0)).tolist() == [480]
+
+
+def test_an_interpolated_channel_rests_on_the_values_of_its_sensor():
+    """As many of its rows as lie between two equal samples."""
+    rng, step, t = np.random.default_rng(1), 1e-3, np.arange(2000) / 100
+    sensor = np.rint(0.2 * np.sin(0.5 * t) / step) * step
+    later = np.interp(np.sort(rng.uniform(0.0, t[-1], 4000)), t, sensor)
+    assert np.unique(later).size > 2000
+    assert quantum(later) == pytest.approx(step)
 
 
 WEIGHT = 400.0
