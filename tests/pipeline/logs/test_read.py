@@ -77,7 +77,7 @@ def test_bad_columns_give_one_clear_line(spoil, words, columns, read):
 
 def test_a_joint_the_log_does_not_know_stands_still_and_is_left_out(columns, read):
     known = {k: v for k, v in columns.items() if not k.startswith("b__")}
-    log = read(known)
+    log = read(known | {"a__vibration_m_s": known["time_s"]})  # whose name is no slip
     assert np.all(log.position[:, 1] == 0.0)
     assert "taken as still at 0 rad" in log.left_out["b"]
     empty = columns | {k: np.full(2000, np.nan) for k in columns if k.startswith("b__")}
