@@ -53,7 +53,7 @@ def test_zeros_of_a_polynomial_become_breaks(time, velocity, times, directions):
 
 
 @pytest.mark.parametrize(
-    ("time", "velocity", "times", "directions"),
+    ("time", "v", "times", "directions"),
     [
         (STEPS, [2, 0, 1, 0, -1, -1], [0, 1, 2, 3, 3, 4, 5], [1, 1, 1, 1, -1, -1, -1]),
         (STEPS, [1, 0, 0, 0, 1, 1], [0, 1, 1, 2, 3, 3, 4, 5], [1, 1, 0, 0, 0, 1, 1, 1]),  # rest
@@ -62,11 +62,9 @@ def test_zeros_of_a_polynomial_become_breaks(time, velocity, times, directions):
         ([0, 1, 1, 2], [1, 0, 0, 0], [0, 1, 1, 2], [1, 1, 0, 0]),  # rest after motion
     ],
 )
-def test_samples_at_rest_and_jumps(time, velocity, times, directions):
-    v = np.array(velocity, dtype=float)
-    s = split(series(time, v, v, 0 * v, v))
-    assert s.time.tolist() == times
-    assert s.direction[:, 0].tolist() == directions
+def test_samples_at_rest_and_jumps(time, v, times, directions):
+    s = split(series(time, v, v, 0 * np.array(v), v))
+    assert (s.time.tolist(), s.direction[:, 0].tolist()) == (times, directions)
 
 
 def test_at_a_break_the_other_joints_are_interpolated():

@@ -1,6 +1,5 @@
 """The plain evaluation against full chains, supplies and closed forms."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -74,9 +73,7 @@ def chain_of(d: Designs, i: int, *, closed: bool) -> Chain:
     return Chain("design", tuple(elements), motor, MappingProxyType({"m": "rotor"}))
 
 
-def in_full(
-    d: Designs, i: int, loads: Sequence[Load], joints: Sequence[str], fraction: float = 0.0
-) -> tuple[list[float], dict[str, float]]:
+def in_full(d, i, loads, joints, fraction=0.0):
     """One design through its chain: mean power of every mode, greatest share of each limit."""
     powers, use = [], dict[str, float]()
 

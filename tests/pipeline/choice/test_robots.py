@@ -1,7 +1,7 @@
 """Robots with their own mass: against demand computed anew, brute force, and more parts."""
 
 import re
-from collections.abc import Sequence, Set
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import islice, product
 from types import SimpleNamespace
@@ -52,13 +52,7 @@ def shelf_of(names: Sequence[str]) -> PartCatalog:
     return PartCatalog({n: known[n] for n in names}, voltage=46.8, margins=Margins(1.2, 1.1))
 
 
-def search_of(
-    names: Sequence[str],
-    robot: str = "urdf/hexapod.toml",
-    modes: Sequence[Mode] = DAY,
-    pairs: Set[tuple[str, str]] | None = None,
-    step: int = 1,
-) -> Search:
+def search_of(names, robot="urdf/hexapod.toml", modes=DAY, pairs=None, step=1):
     """Of every `step`-th sample of a motion."""
     machine, shelf = lw.load(robot), shelf_of(names)
     groups = groups_of(machine.robot.spec)
@@ -295,7 +289,6 @@ def test_a_robot_beyond_a_limit_in_the_search_alone_is_an_end_of_the_front(tmp_p
 
 def test_envelope_is_the_least_of_each_family_at_every_share(search):
     own = envelope(search)
-    assert own is not None
     for family, names in own.robots.items():
         for robot in names:
             locks = [bool(brake) or gear == "hpc_m1_120" for _, gear, brake in robot]
@@ -305,12 +298,10 @@ def test_envelope_is_the_least_of_each_family_at_every_share(search):
     # Brakes are open while it walks, and nothing is drawn while all joints are locked.
     assert own.power[ALL][0] > own.power[NONE][0]
     assert own.power[ALL][-1] == pytest.approx(0.0, abs=1e-9)
-    assert own.crossing is not None
     assert 0.3 < own.crossing < 0.95
     sides = dict.fromkeys([*own.robots[NONE], *own.robots[ALL]])
     drawn = monte_carlo(search, [*sides], 24)
     span = crossing_range(search, drawn)
-    assert span is not None
     assert span[0] < own.crossing < span[1]
 
 

@@ -97,7 +97,6 @@ def test_on_a_slope_the_ground_carries_the_weight_with_the_friction_of_its_angle
     robot = load_robot(hexapod.spec.with_gait(slope_forward="12 deg"))
     segment = standing_posture(robot)
     _, contacts = segment_demand(robot, segment)
-    assert contacts is not None
     weight = hexapod.mass * hexapod.spec.parameters["gravity"]
     np.testing.assert_allclose(contacts.force_world.sum(axis=1), [[0, 0, weight]], atol=1e-9)
     normal, tangential = contacts.normal_force, contacts.friction_needed * contacts.normal_force
@@ -142,9 +141,7 @@ def swinging(robot: Robot, samples: int = 9) -> Segment:
 
 
 @pytest.fixture(scope="module", params=["hexapod", "mixed legs"])
-def robot(
-    request: pytest.FixtureRequest, hexapod: Robot, tmp_path_factory: pytest.TempPathFactory
-) -> Robot:
+def robot(request, hexapod, tmp_path_factory):
     """Six legs of three joints; four legs of two to seven that turn and slide."""
     if request.param == "hexapod":
         return hexapod

@@ -86,7 +86,6 @@ J2 = "rm_joint_2"
 
 def with_motor(model: MachineModel, **changes: float) -> MachineModel:
     actuator = model.actuator(J2)
-    assert actuator.motor is not None
     return model.with_actuator(replace(actuator, motor=replace(actuator.motor, **changes)))
 
 

@@ -9,12 +9,11 @@ import pytest
 
 from actuators.loading.build import load_catalog
 from pipeline.effects.base import effect_named
-from pipeline.identification.design import Placed, Term, make_data_sets, make_design
+from pipeline.identification.design import make_data_sets, make_design
 from pipeline.identification.fit import settled, start_fit
 from pipeline.identification.offered import block_terms
 from pipeline.identification.residual import floor_of
 from pipeline.identification.search import near
-from pipeline.identification.tolerances import Resistance
 from pipeline.logs.load import Asked, load
 from pipeline.logs.log import Log, expected_of_robot
 from pipeline.logs.mapping import parse_mapping
@@ -94,7 +93,6 @@ def test_free_rows_tell_the_motor_from_its_friction(stated, logs):
 def test_rows_of_a_shorted_bridge_do_not_count_and_make_no_gain(stated, tmp_path):
     """The motor brakes in them; the others tell friction, and resistance over torque constant."""
     (log,) = driven(stated, tmp_path, "shorted")
-    assert log.off is not None
     assert log.off.mean() > 0.4
     assert not log.mask[log.off].any()
     found, a = fitted(stated, (log,)), stated.actuator(JOINT).driven
@@ -102,13 +100,3 @@ def test_rows_of_a_shorted_bridge_do_not_count_and_make_no_gain(stated, tmp_path
     per_constant = (1.0 + found["resistance"]) * (1.0 + found["torque_constant_error"])
     truth = (RESISTANCE / CONSTANT) / (a.resistance / a.torque_constant)
     assert per_constant == pytest.approx(truth, rel=0.02)
-
-
-def test_column_of_a_resistance_is_its_slope_about_another(stated, logs):
-    term = Term(Resistance(), (JOINT,), block="resistance", unit=(1.0,))
-    sets = make_data_sets(logs)
-    columns = [
-        make_design(stated, sets, [term], [Placed(term, {"relative": x})]).equations[0].X[0]
-        for x in (0.0, 0.4)
-    ]
-    assert np.allclose(*columns)  # a voltage is linear in it

@@ -16,7 +16,6 @@ import pinocchio as pin
 import pytest
 
 from pipeline.identification.workflow.compared import compare_logs, load_logs
-from pipeline.logs.log import Finding
 from tests.command_line import as_compared
 from tests.pipeline.arm import BODIES, arm_file, arm_text, sines, table, torques
 from tests.pipeline.dynamics.walking_engine import walked
@@ -32,12 +31,10 @@ def urdf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return arm_file(tmp_path_factory.mktemp("arm"), "continuous")
 
 
-def logged(
-    seed: int, *, off: float, payload: float, quick: float = 1.0, text: str = arm_text()
-) -> pd.DataFrame:
+def logged(seed, *, off, payload, quick=1.0, bodies=BODIES):
     """A log of an arm whose bodies differ from the URDF's by up to a share."""
     rng, t = np.random.default_rng(seed), np.arange(2400) / RATE
-    model = pin.buildModelFromXML(text)
+    model = pin.buildModelFromXML(arm_text(bodies=bodies))
     for i in range(1, model.njoints):
         body, scale = model.inertias[i], float(np.exp(np.log1p(off) * rng.uniform(-1.0, 1.0)))
         lever = body.lever + 0.1 * off * rng.uniform(-1.0, 1.0, 3)
@@ -51,14 +48,7 @@ def logged(
     return table(t, q + 1e-5 * rng.standard_normal(q.shape), tau)
 
 
-def judged(
-    log: pd.DataFrame,
-    urdf: Path,
-    folder: Path,
-    mapping: str = "",
-    verdict: str = "suspected",
-    **more: Any,
-) -> list[Finding]:
+def judged(log, urdf, folder, mapping="", verdict="suspected", **more: Any):
     """Suspicions about columns; the run goes on."""
     path, file = folder / "log.parquet", folder / "mapping.toml"
     log.to_parquet(path)
@@ -205,7 +195,7 @@ def test_efforts_of_another_log_are_told(urdf, tmp_path):
 
 def test_a_log_of_another_arm_is_told_by_the_joints_that_nothing_explains(urdf, tmp_path):
     other = (BODIES[0], (0.4, "0 0 1", 2.0, 0.15, 0.02), (0.3, "0 0 1", 1.0, 0.1, 0.005))
-    log = logged(0, off=0.2, payload=0.3, text=arm_text(bodies=other))
+    log = logged(0, off=0.2, payload=0.3, bodies=other)
     (found,) = judged(log, urdf, tmp_path)
     assert "the log of another robot" in found.detail
 

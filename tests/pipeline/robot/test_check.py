@@ -20,12 +20,12 @@ LIMIT = 'effort="1" velocity="1" lower="-1" upper="1"'
 
 
 def link(
-    name: str = "a",
-    mass: float = 2.0,
-    moments: Three = (0.03, 0.04, 0.05),
-    products: Three = NOTHING,
-    centre: Three = NOTHING,
-) -> str:
+    name="a",
+    mass=2.0,
+    moments=(0.03, 0.04, 0.05),
+    products=NOTHING,
+    centre=NOTHING,
+):
     (ixx, iyy, izz), (ixy, ixz, iyz), (x, y, z) = moments, products, centre
     return (
         f'<link name="{name}"><inertial><origin xyz="{x} {y} {z}"/><mass value="{mass}"/>'
@@ -34,9 +34,7 @@ def link(
     )
 
 
-def joint(
-    parent: str, child: str, kind: str = "revolute", limit: str = LIMIT, at: float = 0.3
-) -> str:
+def joint(parent, child, kind="revolute", limit=LIMIT, at=0.3):
     """The joint on which a link hangs, called ``joint_`` and the link's name."""
     tag = f"<limit {limit}/>" if limit and kind != "fixed" else ""
     return (

@@ -46,7 +46,6 @@ def test_published_quadrupeds_are_found_and_stand(name, tmp_path):
         robot.leg_positions(segment.configuration)[0], guess.stance.posture, atol=2e-3
     )
     _, contacts = segment_demand(robot, segment)
-    assert contacts is not None
     assert contacts.force_world[0, :, 2].sum() == pytest.approx(9.81 * guess.mass, rel=1e-9)
     assert (contacts.force_world[0, :, 2] > 0).all()
 

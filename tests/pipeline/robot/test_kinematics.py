@@ -4,8 +4,6 @@ Legs of two to seven joints that turn or slide, some in frames turned against th
 exports are, and those of the project's robots.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -26,9 +24,7 @@ N = 12
 
 
 @pytest.fixture(scope="module", params=["mixed", "hexapod", "leg"])
-def robot(
-    request: pytest.FixtureRequest, root: Path, tmp_path_factory: pytest.TempPathFactory
-) -> Robot:
+def robot(request, root, tmp_path_factory):
     if request.param == "mixed":
         return walker(tmp_path_factory.mktemp("mixed"), MIXED, arm=True)
     return load_robot(load_robot_file(root / "urdf" / f"{request.param}.toml"))

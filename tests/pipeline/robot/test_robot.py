@@ -99,7 +99,6 @@ SOLO = [f"{leg}_{joint}" for leg in ("FL", "FR", "HL", "HR") for joint in ("HAA"
 
 def test_a_robot_is_known_by_its_name_and_all_of_its_joints():
     found = known_motors(("solo12",), SOLO)
-    assert found is not None
     assert found["folder"] == "known:solo12"
     assert known_motors(("mine", "solo"), SOLO) is not None  # by the URDF's own name
     assert known_motors(("mine", "yours"), SOLO) is None

@@ -1,6 +1,5 @@
 """Forward simulation against another integrator, in closed form, and by its energies."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -39,9 +38,7 @@ def machine(*friction: Friction, **changes: object) -> MachineModel:
     return model.with_actuator(Chain(JOINT, elements, motor, **changes))
 
 
-def driven(
-    goal: Callable[[Array], Array], q: float = 0.0, v: float = 0.0, seconds: float = 1.0
-) -> ServoInput:
+def driven(goal, q=0.0, v=0.0, seconds=1.0):
     time = np.arange(round(seconds * 200) + 1) / 200
     on, supply = np.zeros((time.size, 1), dtype=np.bool_), np.full(time.size, SUPPLY)
     start = np.array([q]), np.array([v])
