@@ -19,7 +19,7 @@ from scipy.ndimage import median_filter, percentile_filter
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
 from pipeline.logs.filters import GAP, runs_of
-from pipeline.logs.log import Expected, Finding, Findings, Recording, column_name
+from pipeline.logs.log import EFFORTS, Expected, Finding, Findings, Recording, column_name
 
 #: Fewer rows say nothing about anything.
 FEWEST_ROWS: Final = 100
@@ -97,7 +97,7 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], Recording]
         if _silent(log, joint, q, x, found):
             silent += 1
             continue
-        frame[own] = _good(log.time, x, moving, own, log.unit, found)
+        frame[own] = _good(log.time, x, moving, own, EFFORTS[log.effort], found)
         if off is not None and off[:, j].any():
             frame[own] = np.where(off[:, j], np.nan, frame[own])
     good = replace(log, frame=log.frame.assign(**frame))

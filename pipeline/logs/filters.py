@@ -287,11 +287,6 @@ def _even(time: Array, dt: float) -> Array:
     return time if even else np.minimum(grid, time[-1])
 
 
-def rows_of(piece: slice) -> int:
-    """How many rows a stretch has."""
-    return int(piece.stop - piece.start)
-
-
 def pieces_of(lengths: Iterable[int]) -> tuple[slice, ...]:
     """Stretches of so many rows each, one after another."""
     ends = np.cumsum([0, *lengths]).tolist()

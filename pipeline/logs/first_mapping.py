@@ -21,7 +21,7 @@ from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
 from actuators.parameters import dimension, spelt
 from pipeline.logs.formats import TIMES, open_source
-from pipeline.logs.log import TIME, UNITS, Expected, column_name
+from pipeline.logs.log import POSITIONS, TIME, UNITS, Expected, column_name
 
 #: Words of a name and the quantity that they say.
 _QUANTITIES: Final = {
@@ -61,7 +61,6 @@ _SPELT: Final = {
 }
 _SECONDS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _ANGLES: Final = {"rad": 1.0, "deg": float(np.radians(1.0))}
-_POSITIONS: Final = ("position", "motor_position")
 _ROWS: Final = 100_000  # that are looked at
 #: Rates at which robots log [Hz].
 _RATES: Final = (5.0, 20_000.0)
@@ -132,12 +131,12 @@ def first_mapping(path: Path, expected: Expected) -> FirstMapping:
     foreign = [c for c in data if c not in {*own, clock} and "*" not in c]
     for by_unit in (False, True):  # words of another language: units tell
         guesses = [read_name(c, expected.joints, by_unit) for c in foreign]
-        if any(g.quantity in _POSITIONS for g in guesses):
+        if any(g.quantity in POSITIONS for g in guesses):
             break
     guesses = [g for g in guesses if g.quantity]
     by = _name_owners(guesses, expected.joints)
-    positions = {g.owner: g for g in guesses if g.quantity in _POSITIONS}
-    for g in sorted(guesses, key=lambda g: g.quantity not in _POSITIONS):
+    positions = {g.owner: g for g in guesses if g.quantity in POSITIONS}
+    for g in sorted(guesses, key=lambda g: g.quantity not in POSITIONS):
         _tell_unit(g, data[g.column], positions.get(g.owner), expected)
     taken = {*own}
     for g in guesses:
@@ -148,9 +147,6 @@ def first_mapping(path: Path, expected: Expected) -> FirstMapping:
         taken |= {g.target} if g.sure else set()
     text = [_HEAD.format(where=table.where, by=by), *text]
     text += ["", "[columns]", *(g.line for g in guesses)] if guesses else []
-    said = {g.column for g in guesses} | {*own, clock}
-    if unused := [c for c in table.header if c not in said]:
-        text += ["", "# Not used: " + ", ".join(map(_quoted, unused))]
     mapped, left = (tuple(g.column for g in guesses if g.sure == sure) for sure in (True, False))
     return FirstMapping("\n".join(text) + "\n", mapped, left)
 
@@ -211,7 +207,6 @@ def _tell_unit(g: Guess, x: Array, position: Guess | None, expected: Expected) -
         g.sure, g.unit = bool(fits), "rad" if not fits else "" if "rad" in fits else "deg"
         g.why = f"from {low:.4g} to {high:.4g}: "
         g.why += f"{' or '.join(fits)} by the joint's limits" if fits else "no radians, no degrees"
-        g.why += "; or a motor's angle" * ("rad" not in fits)
 
 
 def words_of(name: str) -> list[str]:

@@ -35,9 +35,6 @@ _ARRAYS: Final = (".mat", ".h5", ".hdf5")
 _PARQUET: Final = (".parquet", ".pq")
 #: Names of a time vector; with it the number of rows is known.
 TIMES: Final = ("time_s", "time", "t", "timestamp", "timestamps", "stamp", "times", "__time")
-_NEEDS: Final = (
-    "reading bags, MATLAB and HDF5 files needs the extra 'bags': pip install -e '.[bags]'"
-)
 #: Of the numbers of one log that are held at once [B]: of a longer one evenly spread stretches are.
 MOST_BYTES: Final = 700_000_000
 _STRETCH: Final = 100_000  # [rows]
@@ -147,7 +144,8 @@ def _reported(where: str) -> Iterator[None]:
     except LegwattError:
         raise
     except ImportError:
-        raise LegwattError(f"{where}: {_NEEDS}") from None
+        what = "reading bags, MATLAB and HDF5 files needs the extra 'bags'"
+        raise LegwattError(f"{where}: {what}: pip install -e '.[bags]'") from None
     except Exception as error:
         text = one_line(error) or type(error).__name__
         raise LegwattError(f"{where}: cannot be read: {text}") from None
@@ -193,8 +191,6 @@ def _csv(path: Path) -> Source:
         if cut := bool(head) and not packed:  # while the last row was written
             stream.seek(-1, 2)
             cut = stream.read() not in (b"\n", b"\r")
-    if not head.strip():
-        raise LegwattError(f"{where}: the file is empty; give a log as CSV or Parquet")
     if b"\x00" in head[:4096]:
         raise LegwattError(f"{where}: not UTF-8 text; save the log as CSV in UTF-8 or as Parquet")
     try:
@@ -206,7 +202,7 @@ def _csv(path: Path) -> Source:
     skip, separator = next((p for p in places if _is_header(*p, lines)), (-1, ","))
     if skip < 0:
         raise LegwattError(
-            f"{where}: no header of column names, with rows of as many cells below it"
+            f"{where}: empty, or no header of column names with rows of as many cells below it"
         )
     below = [x for line in lines[skip + 1 :][:_LOOKED_AT] for x in _cells(line, separator)]
     names = [name.strip() for name in _cells(lines[skip], separator)]

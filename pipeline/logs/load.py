@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from actuators.arrays import Array
 from actuators.errors import LegwattError, known
 from pipeline.logs.checks import judge, refuse_repeats
-from pipeline.logs.filters import LARGEST_SHARE, LowPass, rows_of
+from pipeline.logs.filters import LARGEST_SHARE, LowPass
 from pipeline.logs.log import (
     TEST,
     TIME,
@@ -184,8 +184,8 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
     logs, guard = split(logs, tested, prove_last=asked.prove_last or 0.0)
     if asked.felt is not None:
         logs = [replace(m, noise=np.hypot(m.noise, asked.felt(m))) for m in logs]
-    warning = _SAME * (rule == _BLOCKS)
-    return Logs(tuple(logs), fitted, tuple(found), settings, guard, rule, warning)
+    same = _SAME * (rule == _BLOCKS)
+    return Logs(tuple(logs), fitted, tuple(found), settings, guard, rule, same)
 
 
 def _together(logs: Sequence[Recording]) -> list[Recording]:
@@ -409,7 +409,7 @@ def split(
     # the pattern's order over all logs.
     least = (1 + BLOCK_GUARDS) * FEWEST_BLOCKS * guard * rate
     short = [
-        [p for p in log.pieces if rows_of(p) < least and k not in tested]
+        [p for p in log.pieces if p.stop - p.start < least and k not in tested]
         for k, log in enumerate(logs)
     ]
     turns = cycle(pattern) if sum(map(len, short)) >= len(pattern) else None
@@ -422,7 +422,7 @@ def split(
                 part[piece] = TEST if piece in proving else next(turns)
             else:
                 margin = int(np.ceil(guard * rate))
-                part[piece] = _blocks(rows_of(piece), margin, pattern, prove_last)
+                part[piece] = _blocks(piece.stop - piece.start, margin, pattern, prove_last)
         out.append(replace(log, part=part))
     rows = [sum(int((log.part == k).sum()) for log in out) for k in range(len(NAMES))]
     if min(rows) < _LEAST_ROWS:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from pipeline.logs.mapping import ColumnTable
 
 TIME: Final = "time_s"
+POSITIONS: Final = ("position", "motor_position")
 #: Channels in which measurement and simulation are compared, the most direct first, with unit.
 EFFORTS: Final = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
 
@@ -242,14 +243,8 @@ class Recording:
 
     def position_quantity(self, joint: str) -> str:
         """Of the column that a joint's position was read from."""
-        sides = ("position", "motor_position")
-        read = [side for side in sides if column_name(joint, side) in self.rules]
-        return read[0] if read else sides[self.at_motor]
-
-    @property
-    def unit(self) -> str:
-        """Of the compared effort."""
-        return EFFORTS[self.effort]
+        read = [side for side in POSITIONS if column_name(joint, side) in self.rules]
+        return read[0] if read else POSITIONS[self.at_motor]
 
     @property
     def channels(self) -> tuple[str, ...]:

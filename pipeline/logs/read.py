@@ -24,6 +24,7 @@ from pipeline.logs.log import (
     COLUMNS,
     EFFORTS,
     OFF,
+    POSITIONS,
     TIME,
     Column,
     Expected,
@@ -33,7 +34,6 @@ from pipeline.logs.log import (
 )
 from pipeline.logs.mapping import CANNOT, LAW, ColumnTable, Mapping
 
-POSITIONS: Final = ("position", "motor_position")
 AS_NAMED: Final = ColumnTable()
 #: Similarity from which a column that is unused is taken for a slip of the pen.
 _NEAR: Final = 0.85
@@ -306,8 +306,11 @@ def _sides(frame: Columns, plan: ReadingPlan, ratios: Array, found: Findings) ->
         motor, here = frame.pop(column, None), frame.get(place)
         if not _live(motor):
             continue
-        seen = _slope(motor, here) if _live(here) else None
-        if seen is not None and not abs(seen / ratio - 1.0) <= _CONTRADICTS:
+        own = here if _live(here) else np.full_like(motor, np.nan)
+        both = np.isfinite(motor) & np.isfinite(own)
+        told = both.sum() > 1 and np.ptp(own[both]) > _LEAST_MOTION
+        seen = float(np.polyfit(own[both], motor[both], 1)[0]) if told else ratio
+        if told and not abs(seen / ratio - 1.0) <= _CONTRADICTS:
             detail = f"gear ratio {seen:.6g} by the two positions, {ratio:.6g} by the files"
             found.note(column, "side", "warning", detail, seen)
             ratio = seen
@@ -319,14 +322,6 @@ def _sides(frame: Columns, plan: ReadingPlan, ratios: Array, found: Findings) ->
             )
         frame[column if _live(here) else place] = motor / ratio
     return at_motor
-
-
-def _slope(motor: Array, joint: Array) -> float | None:
-    """Turns of the motor per turn of the joint; None where the joint hardly moves."""
-    good = np.isfinite(motor) & np.isfinite(joint)
-    if good.sum() < 2 or np.ptp(joint[good]) < _LEAST_MOTION:
-        return None
-    return float(np.polyfit(joint[good], motor[good], 1)[0])
 
 
 def _stand_still(frame: Columns, plan: ReadingPlan) -> dict[str, str]:

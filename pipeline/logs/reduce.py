@@ -27,7 +27,6 @@ from pipeline.logs.filters import (
     by_piece,
     choose_cutoff,
     pieces_of,
-    rows_of,
     smoother_noise,
 )
 from pipeline.logs.log import UNUSED, Findings, Log, Recording, column_name
@@ -151,22 +150,17 @@ def choose_settings(
     dt = max(float(np.median(np.diff(log.clock))) for log in logs)
     rate, longest = 1.0 / dt, max(float(np.ptp(log.time)) for log in logs)
     smallest, most = 4.0 / (LONGEST_KERNEL * longest), LARGEST_SHARE * rate
-    if smallest > most:
+    if not smallest <= (most if cutoff is None else cutoff) <= most:
         raise LegwattError(
-            f"{logs[0].name}: {longest:.3g} s at {rate:.4g} Hz are too short to be filtered; "
-            "log longer or faster"
-        )
-    if cutoff is not None and not smallest <= cutoff <= most:
-        raise LegwattError(
-            f"cut-off {cutoff:g} Hz; logs of {longest:.3g} s at {rate:.4g} Hz allow "
-            f"{smallest:.3g} to {most:.4g} Hz"
+            f"{logs[0].name}: {longest:.3g} s at {rate:.4g} Hz allow a cut-off of {smallest:.3g} "
+            f"to {most:.4g} Hz; set one of these, or log longer or faster"
         )
     held = max(min(map(_held, logs)), smallest)
     asked, moved = [], []
     for log in logs:
         grid = Grid.under(log.time, dt, bridge=1.0 / (4.0 * held))
         raw = grid.bridged(log.time, log.position)
-        stretches = [raw[piece] for piece in grid.pieces if rows_of(piece) >= 64]
+        stretches = [x for piece in grid.pieces if len(x := raw[piece]) >= 64]
         if stretches:
             step = np.array([quantum(q) for q in log.position.T])
             cutoffs, reach = choose_cutoff(stretches, rate, smallest=smallest, step=step)

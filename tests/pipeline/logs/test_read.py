@@ -41,7 +41,7 @@ def test_a_good_log_round_trips_in_the_robots_order(columns, read):
     assert log.joints == ("a", "b")
     assert np.array_equal(log.time, columns["time_s"])
     assert np.array_equal(log.position[:, 1], columns["b__position_rad"])
-    assert (log.effort, log.unit) == ("torque", "N*m")
+    assert log.effort == "torque"
     assert not log.at_motor
     assert len(log.sha256) == 64
 
@@ -93,7 +93,7 @@ HEAD = b"time_s,a__position_rad,b__position_rad,a__torque_Nm,b__torque_Nm\n"
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (b"", ("empty",)),
+        (b"", ("empty", "no header")),
         (HEAD, ("no header", "rows")),
         (HEAD + b"0,1,2,3,4\n1,2,3,4,5,6\n2,3,4,5,6\n", ("line 3, saw 6",)),
         (HEAD + b'0,"1,5",2,3,4\n', ("row 2", "a__position_rad", "'1,5'", "as 1.5")),

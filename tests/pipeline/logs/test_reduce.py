@@ -121,8 +121,8 @@ def test_what_cannot_be_prepared_is_refused():
     _, q, _, _, effort = noisy()
     log = made_log(q, effort, RATE)
     for refused, words in (
-        (lambda: settings_of(made_log(q[:100], effort[:100], RATE)), "too short"),
-        (lambda: settings_of(log, 300.0), "cut-off 300 Hz"),
+        (lambda: settings_of(made_log(q[:100], effort[:100], RATE)), "log longer or faster"),
+        (lambda: settings_of(log, 300.0), "to 125 Hz"),
         (lambda: settings_of(made_log(0 * q, effort, RATE)), "no joint moves"),
         (lambda: split([reduced_log(made_log(q[:60], effort[:60], 20.0), 2.0)]), "log longer"),
     ):
