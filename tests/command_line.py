@@ -3,7 +3,6 @@
 import csv
 import json
 import re
-import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -49,27 +48,6 @@ def record_of(path: Path) -> dict[str, Any]:
     record = json.loads((path.parent / "datapackage.json").read_text(encoding="utf-8"))
     (own,) = (one for one in record["resources"] if one["path"] == path.name)
     return {**record, **own}
-
-
-def stand_and_walk(folder: Path, command: Command, *more: str, **robot: Path) -> Path:
-    """The tables of both verbs, which write a folder each, side by side."""
-    files = []
-    for verb in ("stand", "walk"):
-        assert command(verb, folder / verb, *more, **robot) == 0
-        record = json.loads((folder / verb / "datapackage.json").read_text(encoding="utf-8"))
-        files += record["resources"]
-        for path in results(folder / verb):
-            shutil.copyfile(path, folder / path.name)
-        shutil.rmtree(folder / verb)
-    whole = json.dumps({**record, "resources": list({f["path"]: f for f in files}.values())})
-    (folder / "datapackage.json").write_text(whole, encoding="utf-8")
-    return folder
-
-
-def results(folder: Path) -> list[Path]:
-    """What a person sees in a folder, but for the run's record."""
-    hidden = (".", "datapackage.json")
-    return sorted(path for path in folder.iterdir() if not path.name.startswith(hidden))
 
 
 #: Parameters that a robot file with a URDF of the user's own still gives.

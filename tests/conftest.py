@@ -1,6 +1,8 @@
 """Fixtures shared by all packages."""
 
+import json
 import os
+import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -13,7 +15,7 @@ from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from reports.figures import style as saving
-from tests.command_line import DEMO, Command, Refused, exit_code, stand_and_walk
+from tests.command_line import DEMO, Command, Refused, exit_code
 
 # No clock in a test: a loaded machine is no failure.
 settings.register_profile("legwatt", deadline=None)
@@ -69,8 +71,17 @@ def refused(capsys: pytest.CaptureFixture[str]) -> Refused:
 
 @pytest.fixture(scope="session")
 def out(tmp_path_factory: pytest.TempPathFactory, command: Command) -> Path:
-    """The tables of standing and walking with every option at its default."""
-    return stand_and_walk(tmp_path_factory.mktemp("out"), command)
+    """The tables of standing and walking, which write a folder each, with every default."""
+    folder, files = tmp_path_factory.mktemp("out"), {}
+    for verb in ("stand", "walk"):
+        assert command(verb, folder / verb) == 0
+        shutil.copytree(folder / verb, folder, dirs_exist_ok=True)
+        shutil.rmtree(folder / verb)
+        record = json.loads((folder / "datapackage.json").read_text("utf-8"))
+        files |= {one["path"]: one for one in record["resources"]}
+    whole = json.dumps(record | {"resources": [*files.values()]})
+    (folder / "datapackage.json").write_text(whole, "utf-8")
+    return folder
 
 
 @pytest.fixture(scope="session")
