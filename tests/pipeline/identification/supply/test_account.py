@@ -39,12 +39,9 @@ def walk_log(folder: Path, *, efforts: bool, rubbed: float | None = None) -> Pat
     result, supply = walked.results["reversible"], walked.supplies["reversible"]
     time, rate, every = result.joint.time, 200.0, 50
     t = np.arange(round(rate * 10 * time[-1])) / rate
-    # Breaks carry both limits at one instant: the later one counts.
-    at = np.clip(np.searchsorted(time, t % time[-1], side="right") - 1, 0, time.size - 2)
-    share = ((t % time[-1]) - time[at]) / np.maximum(time[at + 1] - time[at], 1e-12)
 
     def along(x: Array) -> Array:
-        return np.asarray(x[at] + (x[at + 1] - x[at]) * share[:, None])
+        return np.stack([np.interp(t % time[-1], time, own) for own in x.T], axis=1)
 
     joint, columns = result.joint, {"time_s": t}
     series = {"position_rad": joint.position, "velocity_rad_s": joint.velocity}
