@@ -390,22 +390,20 @@ class Design:
         Dry friction with a level for each direction, say, has Coulomb's and an offset.
         """
         if number not in self._within:
-            wide, place, out = self.columns[number], self.terms[number].place, []
-            for k, (own, term) in enumerate(zip(self.columns, self.terms, strict=True)):
-                if own.size >= wide.size or term.place != place or term.moves:
-                    continue
-                ids = np.concatenate([wide, own])
-                H = np.zeros((ids.size, ids.size))
-                for e in self.equations:
-                    _, at, here = np.intersect1d(e.ids, ids, return_indices=True)
-                    G = e.total[0][np.ix_(at, at)]
-                    H[np.ix_(here, here)] += G / max(e.effort, 1e-300) ** 2
-                w = wide.size
-                told = np.linalg.lstsq(H[:w, :w], H[:w, w:], rcond=_SAME)[0]
-                mine = np.diag(H)[w:]
-                if (mine - np.sum(H[:w, w:] * told, axis=0) <= SHARE * mine).all():
-                    out.append(k)
-            self._within[number] = out
+            place = self.terms[number].place
+            here = [k for k, t in enumerate(self.terms) if t.place == place]
+            ids, effort = self.of(here), np.array([max(e.effort, 1e-300) for e in self.equations])
+            H, owner = self.between(effort**-2.0, ids, ids), self.owner[ids]
+            # Slopes are in nothing.
+            size = [np.inf if self.terms[k].moves else self.columns[k].size for k in owner]
+            for k in here:
+                w = np.flatnonzero(owner == k)
+                fewer = np.flatnonzero(np.array(size) < w.size)
+                told = np.linalg.lstsq(H[np.ix_(w, w)], H[np.ix_(w, fewer)], rcond=_SAME)[0]
+                mine = np.diag(H)[fewer]
+                told = mine - np.sum(H[np.ix_(w, fewer)] * told, axis=0) <= SHARE * mine
+                out = set(owner[fewer].tolist()) - set(owner[fewer[~told]].tolist())
+                self._within[k] = sorted(out)
         return self._within[number]
 
     def standing(self, names: tuple[int, ...]) -> Index:

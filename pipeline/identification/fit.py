@@ -38,6 +38,8 @@ _RIDGE: Final = 1e-10
 #: Turns at which blocks are tried as nothing, and those that are nothing at this scale.
 _REVIEWED: Final = (0, 4, 10)
 _REVIVED: Final = 0.03
+#: Times that coordinates against their sign leave at once, and those that would have theirs return.
+_EXCHANGED: Final = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +61,11 @@ class Fit:
     @cached_property
     def active(self) -> Index:
         """Columns in use."""
-        live = self._live if self.negative is None else self._live & ~self.negative
+        live = self.live if self.negative is None else self.live & ~self.negative
         return np.asarray(self.offered[live[self.offered]])
 
     @cached_property
-    def _live(self) -> Mask:
+    def live(self) -> Mask:
         """Columns but those of blocks that are nothing, shape (K,)."""
         out = self.deviation > NOTHING * self.design.unit
         out[self.design.of(self.names)] = True
@@ -127,6 +129,12 @@ class Fit:
         """Places of the active columns among what is offered."""
         return np.searchsorted(self.offered, self.active)
 
+    @property
+    def _system(self) -> tuple[Array, Array]:
+        """A (n, n) over the active columns, and b (n,)."""
+        H, h = self.sums
+        return H + np.diag(self.prior), h
+
     @cached_property
     def solved(self) -> tuple[Array, Array, Array]:
         """Cholesky factor of A over the active columns, their values, and b."""
@@ -188,12 +196,13 @@ class Fit:
         A body is the same in all directions; what soft ground or a sole leaves in one is not.
         """
         out = self.evidence
+        whole, right = self._system
         for k, e in enumerate(self.design.equations):
             if e.joint >= len(self.design.model.joints):
                 mine, at = self.among(e.ids)
                 G, h = e.total[0][mine[:, None], mine], e.total[1][mine]
-                A, b = self.solved[0] @ self.solved[0].T, self.solved[2].copy()
-                A[at[:, None], at] -= self.weights[k] * G
+                A, b = whole.copy(), right.copy()
+                A[(at[:, None], at) if at.size < b.size else ...] -= self.weights[k] * G
                 b[at] -= self.weights[k] * h
                 np.einsum("ii->i", A)[...] *= 1.0 + _RIDGE
                 x = np.linalg.solve(A, b)[at]
@@ -227,15 +236,19 @@ class Fit:
         return 0.5 * float(np.log(q / p).sum() - np.linalg.slogdet(M)[1] - change)
 
     @cached_property
-    def signs_stand(self) -> bool:
-        """Whether all have their signs, and what is left out for its sign would be against it."""
-        x, unsigned = self.solved[1], ~self.design.signed
-        if (x[unsigned[self.active]] < 0.0).any():
-            return False
-        assert self.negative is not None
-        out = np.flatnonzero((self.negative & self._live)[self.offered])
+    def against(self) -> tuple[Index, Index]:
+        """Columns against their sign, and those left out for it that would have theirs."""
+        x, wrong = self.solved[1], self.active[(self.solved[1] < 0.0) & ~self._signed]
+        if self.negative is None:
+            return wrong, wrong[:0]
+        out = np.flatnonzero((self.negative & self.live)[self.offered])
         H, h = self._sums
-        return bool((h[out] <= H[out[:, None], self._use] @ x).all())
+        return wrong, self.offered[out[h[out] > H[out[:, None], self._use] @ x]]
+
+    @cached_property
+    def _signed(self) -> Mask:
+        """Active columns that may have either sign, (n,)."""
+        return self.design.signed[self.active]
 
     def without(self, number: int) -> Fit:
         """The same with one name less; settle it."""
@@ -247,12 +260,12 @@ class Fit:
         every = [(e, *self.among(e.ids)) for e in self.design.equations]
         return [(at, *e.by_chunk(mine)) for e, mine, at in every]
 
+    @cached_property
     def _less_chunks(self) -> tuple[Array, Array, Array]:
         """A without each chunk, scaled, its right side and the scale, each (C, n, ...)."""
-        A = np.tile(self.solved[0] @ self.solved[0].T, (CHUNKS, 1, 1))
-        h = np.tile(self.solved[2], (CHUNKS, 1))
+        A, h = (np.tile(x, (CHUNKS, *(1,) * x.ndim)) for x in self._system)
         for w, (at, G, own) in zip(self.weights, self._by_chunk, strict=True):
-            A[:, at[:, None], at] -= w * G
+            A[(slice(None), at[:, None], at) if at.size < h.shape[1] else ...] -= w * G
             h[:, at] -= w * own
         scale = np.sqrt(np.maximum(np.einsum("cii->ci", A), 1e-300))
         A /= scale[:, :, None] * scale[:, None]
@@ -268,14 +281,14 @@ class Fit:
     def from_others(self) -> Array:
         """Values of all columns by estimates from all chunks but one, shape (C, K)."""
         out = np.zeros((CHUNKS, self.design.size))
-        A, h, scale = self._less_chunks()
+        A, h, scale = self._less_chunks
         out[:, self.active] = np.linalg.solve(A, h[..., None])[..., 0] / scale
         return out
 
     @cached_property
     def _others(self) -> Array:
         """Covariance by all chunks but one, shape (C, n, n)."""
-        A, _, scale = self._less_chunks()
+        A, _, scale = self._less_chunks
         return np.asarray(np.linalg.inv(A) / (scale[:, :, None] * scale[:, None]))
 
     def left_out(self, equations: Sequence[int]) -> Array:
@@ -285,10 +298,19 @@ class Fit:
     @cached_property
     def _chunk_losses(self) -> list[Array]:
         out = []
-        for e, (at, G, h) in zip(self.design.equations, self._by_chunk, strict=True):
+        pairs = zip(self.design.equations, self._by_chunk, self._chunk_rests, strict=True)
+        for e, (at, _, h), rest in pairs:
             x = self.from_others[:, self.active[at]]
-            left = e.sums[1] + np.sum(x * ((G @ x[..., None])[..., 0] - 2.0 * h), axis=1)
-            out.append(np.maximum(left, 0.0))
+            out.append(np.maximum(e.sums[1] - np.sum(x * (h + rest), axis=1), 0.0))
+        return out
+
+    @cached_property
+    def _chunk_rests(self) -> list[Array]:
+        """By equation X^T (r - X x) of every chunk (C, m), x by estimates from the others."""
+        out = []
+        for at, G, h in self._by_chunk:
+            x = self.from_others[:, self.active[at], None]
+            out.append(h - (G @ x)[..., 0])
         return out
 
     def _lost(self, columns: Index, equations: Sequence[int]) -> Array:
@@ -297,23 +319,13 @@ class Fit:
         What other chunks make of the rest follows from the covariances at hand.
         """
         at, out = self.among(columns)[1], []
-        own = self._others[:, at[:, None], at]
-        y = np.linalg.solve(own, self.from_others[:, columns, None])[..., 0]
+        C = self._others[:, :, at]
+        v = C @ np.linalg.solve(C[:, at], self.from_others[:, columns, None])
         for k in equations:
-            H, g = self._by_others[k]
-            change = (H[:, at[:, None], at] @ y[..., None])[..., 0] + 2.0 * g[:, at]
-            out.append(self._chunk_losses[k] + np.sum(y * change, axis=1))
+            own, G, _ = self._by_chunk[k]
+            change = (G @ v[:, own])[..., 0] + 2.0 * self._chunk_rests[k]
+            out.append(self._chunk_losses[k] + np.sum(v[:, own, 0] * change, axis=1))
         return np.maximum(np.stack(out, axis=1), 0.0)
-
-    @cached_property
-    def _by_others(self) -> list[tuple[Array, Array]]:
-        """By equation C X^T X C (C, n, n) and C (X^T r - X^T X x) (C, n), C by other chunks."""
-        out = []
-        for at, G, h in self._by_chunk:
-            own, x = self._others[:, at], self.from_others[:, self.active[at]]
-            rest = h - (G @ x[..., None])[..., 0]
-            out.append((own.swapaxes(1, 2) @ (G @ own), (rest[:, None] @ own)[:, 0]))
-        return out
 
     def sure(self, less: Fit | Index, equations: Sequence[int]) -> tuple[float, float]:
         """How much worse another fit predicts chunks that it has not seen.
@@ -410,12 +422,14 @@ def _gain(S: Array, g: Array, narrow: Array, wide: Array, signed: Mask) -> Array
 
 def factored(H: Array, h: Array, prior: Array) -> tuple[Array, Array]:
     """Cholesky factor of H + diag(prior), and (H + diag(prior))^-1 h; scaled before it is taken."""
-    A = H + np.diag(prior)
+    A = H.copy()
+    A.flat[:: len(A) + 1] += prior
     scale = np.sqrt(np.diag(A))
-    A = A / np.outer(scale, scale)
-    A[np.diag_indices_from(A)] += _RIDGE
-    L = scale[:, None] * np.linalg.cholesky(A)
-    return L, scipy.linalg.cho_solve((L, True), h)
+    A /= scale[:, None]
+    A /= scale
+    A.flat[:: len(A) + 1] += _RIDGE
+    L = np.asarray(scale[:, None] * np.linalg.cholesky(A))
+    return L, scipy.linalg.cho_solve((L, True), h, check_finite=False)
 
 
 def start_fit(design: Design, floor: Array) -> Fit:
@@ -488,20 +502,26 @@ def _reviewed(fit: Fit, bounds: Mapping[str, float]) -> Fit:
             continue
         if fit.with_prior(ids, trial * d.unit[ids]) > 0.0:
             scales = {**fit.scales, b: trial}
-            fit = _right_signs(replace(fit, scales=scales, negative=None))
+            fit = _right_signs(replace(fit, scales=scales))
     return fit
 
 
 def _right_signs(fit: Fit) -> Fit:
     """The estimate whose coordinates have their signs: those left out would come out against it."""
-    if fit.negative is not None:
-        if fit.signs_stand:
+    if fit.negative is not None and (fit.negative & ~fit.live).any():
+        fit = replace(fit, negative=fit.negative & fit.live)
+    for _ in range(_EXCHANGED):  # which mostly leads to where only one set is
+        wrong, back = fit.against
+        if not wrong.size and not back.size:
             return fit
-        fit = replace(fit, negative=None)
+        negative = (
+            np.zeros(fit.design.size, np.bool_) if fit.negative is None else fit.negative.copy()
+        )
+        negative[wrong], negative[back] = True, False
+        fit = replace(fit, negative=negative)
+    fit = replace(fit, negative=None)
     L, x, _ = fit.solved
     signed = fit.design.signed[fit.active]
-    if (x[~signed] >= 0.0).all():
-        return fit
     # Penalised squares in the others, at the best of those that may have either sign for each.
     order = np.argsort(~signed, kind="stable")
     R = np.asarray(np.linalg.qr(L.T[:, order], mode="r"))[signed.sum() :, signed.sum() :]
