@@ -493,7 +493,7 @@ class Identified:
         kept = frozenset(_key_of(f) for f in found)
         if kept >= {t.key for t in self.answer.told}:
             return tuple(found)
-        again = answered(self.answer.found, kept)
+        again = replace(answered(self.answer.fit, kept), found=self.answer.found)
         by_key = {t.key: t for t in again.told}
         out = []
         for f in found:
