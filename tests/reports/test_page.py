@@ -14,11 +14,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.columns import frame
-from pipeline.effects.model_file import Edit, EditParameter, model_text, new_model_file
+from pipeline.effects.model_file import model_text, new_model_file
 from pipeline.identification.results import Residual
 from reports.page import cell_text, html, marked, plain, table
 from reports.pages.gap_page import answer
-from tests.command_line import HIDDEN, exit_code
+from tests.command_line import HIDDEN, edit_of, exit_code
 
 
 class Page:
@@ -78,15 +78,9 @@ def test_a_text_from_outside_is_never_markup():
     whole = dict.fromkeys(numbers.split(), 1.0) | {"battery": BAD, "answer": BAD}
     bad = pd.DataFrame({BAD: [BAD]})
     content = {"title": BAD, "notices": (BAD,), "buy": (BAD,), "whole": whole, "best": whole}
-    content |= {
-        "figures": ("front",),
-        "pack": BAD,
-        "trust": (BAD, BAD),
-        "notes": (BAD,),
-        "today": True,
-    }
+    content |= {"figures": ("front",), "pack": BAD, "trust": (BAD, BAD), "notes": (BAD,)}
     content |= {"columns": {}, "parts": bad, "measured": bad, "missed": 0, "files": {BAD: BAD}}
-    content["sections"] = {"parts": BAD, "measured": "Measured"}
+    content |= {"today": True, "sections": {"parts": BAD, "measured": "Measured"}}
     read = Page(html("choice", limits(), **content))
     assert "script" not in read.tags
     assert read.text.count(BAD) == 17
@@ -133,10 +127,7 @@ def test_another_robots_page_is_whole_and_has_no_word_of_the_paper(solo):
 
 @pytest.mark.usefixtures("sketched")
 def test_a_gaps_page_with_findings(root, short_demo, tmp_path):
-    torque = EditParameter(
-        name="torque", value=HIDDEN.parameters["torque"], unit="N*m", interval=(1.9, 2.1)
-    )
-    edit = Edit(effect=HIDDEN.effect, place=HIDDEN.place, parameters=(torque,))
+    edit = edit_of(HIDDEN.effect, *HIDDEN.place, within=0.05, **HIDDEN.parameters)
     file = new_model_file(root / "urdf" / "hexapod.toml", "rotor").with_edits([edit])
     model = tmp_path / "model.toml"
     model.write_text(model_text(file, tmp_path), encoding="utf-8")

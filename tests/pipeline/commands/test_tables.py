@@ -142,10 +142,8 @@ def test_two_processes_leave_the_same_bytes(root, tmp_path):
 def test_a_urdf_of_ones_own_stands_like_the_built_one(root, tmp_path, command, out):
     """The robot of the refusals is sound before it is spoilt, and gives the same numbers."""
     assert command("stand", tmp_path, robot=own_robot(root, tmp_path, "</robot>", "</robot>")) == 0
-    own, built = (
-        pd.read_csv(folder / "standing.csv", index_col=[0, 1]) for folder in (tmp_path, out)
-    )
-    pd.testing.assert_frame_equal(own, built, rtol=1e-6, atol=1e-9)
+    tables = (pd.read_csv(folder / "standing.csv", index_col=[0, 1]) for folder in (tmp_path, out))
+    pd.testing.assert_frame_equal(*tables, rtol=1e-6, atol=1e-9)
 
 
 ROBOT = Path(__file__).parents[3] / "urdf" / "hexapod.toml"

@@ -223,10 +223,8 @@ TWO_LEGS = ("base", "l0", "base", "l2")
 
 def test_a_robot_that_stands_is_no_fixed_base(tmp_path):
     """Two legs carry a trunk that a bare URDF fixes: the ground pushes their ends up by 40 N."""
-    urdf, model = (
-        tmp_path / "stands.urdf",
-        pin.buildModelFromXML(arm_text(parents=TWO_LEGS, bodies=LEGS)),
-    )
+    urdf = tmp_path / "stands.urdf"
+    model = pin.buildModelFromXML(arm_text(parents=TWO_LEGS, bodies=LEGS))
     urdf.write_text(arm_text("continuous", TWO_LEGS, LEGS), "utf-8")
     data, rng, t = model.createData(), np.random.default_rng(5), np.arange(2400) / RATE
     w = 2 * np.pi * rng.uniform(0.2, 0.6, 4)

@@ -210,10 +210,8 @@ def test_a_gait_written_out_demands_what_the_gait_demands(hexapod, tmp_path, gai
 
 
 def test_an_arm_on_a_stand_needs_no_contacts(root):
-    robot, time = (
-        load_robot(load_robot_file(root / "urdf" / "leg.toml")),
-        np.linspace(0.0, 2.0, 201),
-    )
+    robot = load_robot(load_robot_file(root / "urdf" / "leg.toml"))
+    time = np.linspace(0.0, 2.0, 201)
     q = 0.2 * np.sin(np.pi * time)
     columns = {"time_s": time} | {f"{joint}__position_rad": q for joint in robot.joints}
     (segment,) = read_motion(pd.DataFrame(columns), robot).segments
