@@ -169,7 +169,8 @@ def answered(found: Fit, allowed: frozenset[Key] | None = None) -> Answer:
     told = sorted(
         (t for t in told if t.stands), key=lambda t: (not _on_stated(t.key), -t.against_nothing)
     )
-    left = tuple(t for t in _judged(found) if t.priced and t.key in suspected)
+    judged = _judged(found, only=frozenset(suspected)) if suspected else ()
+    left = tuple(t for t in judged if t.priced)
     return Answer(fit, found, tuple(told), left)
 
 
@@ -235,7 +236,7 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
     # Where one is loose, all are told: the file lacks nothing that the estimate has.
     bodies = [k for k, t in enumerate(d.terms) if isinstance(t.effect, BodyStrain)]
     if fit.loose and (only is None or BODIES in only):
-        tied = settled(replace(fit, loose=frozenset(), negative=None), 5)
+        tied = settled(replace(fit, loose=frozenset()), 5)
         touched = sorted({e for k in bodies for e in d.touched(k)})
         # What is not told is the files', which a tight prior leaves where the log insists.
         files = settled(tied.lacking(bodies), 5)
@@ -361,7 +362,7 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
     """What explains the log nearly as well in the place of a name, each estimated."""
     fit, d = answer.fit, answer.fit.design
     names = tuple(k for k in fit.names if k not in one.terms)
-    less = replace(fit, names=names, negative=None)
+    less = replace(fit, names=names)
     bodies = one.key == BODIES
     less = settled(replace(less, loose=frozenset()) if bodies else less.lacking(one.terms), 5)
     out: list[Rival] = []
@@ -371,7 +372,7 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
         key = d.terms[added[0]].key if added else BODIES
         if any(r.key == key for r in out):
             continue
-        other = settled(replace(less, names=move[1], loose=move[2], negative=None), 5)
+        other = settled(replace(less, names=move[1], loose=move[2]), 5)
         if added and not couples(d.terms[added[0]]) and not _required(other, added[0]):
             continue  # without its main size it is another name
         linear, behind = other, fit.rise(other)

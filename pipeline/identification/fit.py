@@ -252,7 +252,7 @@ class Fit:
 
     def without(self, number: int) -> Fit:
         """The same with one name less; settle it."""
-        return replace(self, names=tuple(k for k in self.names if k != number), negative=None)
+        return replace(self, names=tuple(k for k in self.names if k != number))
 
     @cached_property
     def _by_chunk(self) -> list[tuple[Index, Array, Array]]:
@@ -275,7 +275,7 @@ class Fit:
     def lacking(self, terms: Sequence[int]) -> Fit:
         """The same where some terms are nothing; settle it."""
         omitted = self.omitted | set(self.design.of(terms).tolist())
-        return replace(self, omitted=omitted, negative=None)
+        return replace(self, omitted=omitted)
 
     @cached_property
     def from_others(self) -> Array:
@@ -543,7 +543,7 @@ def refreshed(fit: Fit) -> Fit:
     for e in fit.design.equations:
         own = e.left(fit.x)[e.chunk >= 0]
         kappa.append(np.sqrt(independent(own) * independent(e.least)))
-    return replace(fit, kappa=np.array(kappa), negative=None)
+    return replace(fit, kappa=np.array(kappa))
 
 
 def independent(left: Array) -> float:

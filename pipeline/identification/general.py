@@ -120,7 +120,7 @@ def kept_kinds(beside: Fit, names: int) -> tuple[Fit, bool]:
     """
     some = False
     for k in range(names, len(beside.design.terms)):
-        less = replace(beside.lacking([k]), negative=beside.negative)
+        less = beside.lacking([k])
         sure, share = beside.sure(less, beside.design.touched(k))
         if sure > SURE and share > SHARE:
             some = True

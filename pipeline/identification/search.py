@@ -122,7 +122,7 @@ def _alone(first: Fit) -> Fit | None:
     # The laws are nothing beside it until they are likelier.
     silent = {d.terms[k].block: NOTHING for k in laws}
     scales = {**named.scales, **silent}
-    return settled(replace(named, omitted=frozenset(), scales=scales, negative=None))
+    return settled(replace(named, omitted=frozenset(), scales=scales))
 
 
 def _tied(fit: Fit) -> Fit:
@@ -242,7 +242,7 @@ def moves(fit: Fit, closed: frozenset[Key] = frozenset()) -> list[Move]:
 
 
 def _taken(fit: Fit, move: Move) -> Fit:
-    return settled(replace(fit, names=move[1], loose=move[2], negative=None), _QUICK)
+    return settled(replace(fit, names=move[1], loose=move[2]), _QUICK)
 
 
 def impossible(fit: Fit) -> list[int]:
@@ -313,7 +313,7 @@ def _swapped(fit: Fit) -> Fit:
         if couples(fit.design.terms[k]):  # what stands about it would keep it
             continue
         less = fit.without(k)
-        gains = {k in m[1]: m[0] for m in reversed(moves(replace(less, negative=fit.negative)))}
+        gains = {k in m[1]: m[0] for m in reversed(moves(less))}
         if gains.get(False, 0.0) < FORESEES * gains.get(True, 0.0):
             continue
         rest = settled(less, _QUICK)
@@ -321,7 +321,7 @@ def _swapped(fit: Fit) -> Fit:
         if found is not None:
             return _swapped(_pruned(found))
     for block in sorted(fit.loose):
-        rest = settled(replace(fit, loose=fit.loose - {block}, negative=None), _QUICK)
+        rest = settled(replace(fit, loose=fit.loose - {block}), _QUICK)
         if fit.rise(rest) < 0.0:
             return _swapped(rest)
         found = _best(fit, [m for m in moves(rest) if block not in m[2]][:1], BARE)
@@ -380,7 +380,9 @@ def about(
     blocks = {t.block for t in design.terms if t.block}
     scales = {b: fit.scale(b) for b in blocks}
     gone = [k for k, t in enumerate(design.terms) if t.identity in omitted]
-    same = replace(fit, design=design, names=tuple(kept), scales=scales, omitted=frozenset())
+    same = replace(
+        fit, design=design, names=tuple(kept), scales=scales, omitted=frozenset(), negative=None
+    )
     return same.lacking(gone)
 
 
