@@ -102,6 +102,20 @@ def near(
     return fit
 
 
+def arrived(fit: Fit, nothing: frozenset[tuple[object, ...]] = frozenset()) -> Fit:
+    """A fit on columns where steps of Newton's lead, of all that competes on its own.
+
+    Steps need the columns of what stands alone, which take a fraction of the time.
+    """
+    first, moved = fit, frozenset[str]()
+    for _ in range(_NEWTON):
+        if not is_far(fit):
+            break
+        moved |= _parts_moved(fit)
+        fit = settled(about(fit, nothing, alone=True))
+    return settled(about(fit, nothing, since=(first.design, moved)))
+
+
 def _alone(first: Fit) -> Fit | None:
     """The likeliest name where no common law stands beside it, then all beside it.
 
@@ -118,7 +132,8 @@ def _alone(first: Fit) -> Fit | None:
         named = _best(bare, [m for m in moves(bare) if m[1]][:_TRIED])
     if named is None:
         return None
-    named = near(named, gone, _NEWTON)
+    if is_far(named):
+        named = arrived(named, gone)
     # The laws are nothing beside it until they are likelier.
     silent = {d.terms[k].block: NOTHING for k in laws}
     scales = {**named.scales, **silent}
@@ -145,7 +160,7 @@ def polished(fit: Fit) -> Fit:
         fit = settled(refreshed(fit))
         if not (is_far(fit) or any(fit.design.terms[k].free for k in fit.names)):
             return climbed(fit)
-        again = climbed(settled(about(fit)))
+        again = climbed(arrived(fit))
         same = keys_of(again) == keys_of(fit)
         fit = again
         if same and not is_far(fit):
@@ -334,7 +349,11 @@ def _swapped(fit: Fit) -> Fit:
 
 
 def about(
-    fit: Fit, omitted: frozenset[tuple[object, ...]] = frozenset(), *, alone: bool = False
+    fit: Fit,
+    omitted: frozenset[tuple[object, ...]] = frozenset(),
+    *,
+    alone: bool = False,
+    since: tuple[Design, frozenset[str]] | None = None,
 ) -> Fit:
     """The same names on columns about their estimates, with other nonlinear parameters beside.
 
@@ -342,22 +361,19 @@ def about(
         fit: Of whose values.
         omitted: Identities of terms that are nothing in it and are to stay so.
         alone: Whether names that do not stand are left away, which takes a fraction of the time.
+        since: A design of all that competes, that of the fit by default, and what moved since it.
     """
     d = fit.design
+    whole, moved = since or (d, frozenset())
     point = _point(fit)
     standing = {p.term.key: p.term for p in point if not p.term.block}
     names = {d.terms[k].key for k in fit.names}
     forms = {(d.terms[k].key, *d.terms[k].shape) for k in fit.names}
     coupled = {joint for t in standing.values() if couples(t) for joint in t.place}
-    terms: list[Term] = []
-    for k, t in enumerate(d.terms):
-        if isinstance(t.effect, Slope):
-            continue
-        if k in fit.names:
-            terms.append(replace(standing.get(t.key, t), reach=1.0))
-        elif t.block or not (
-            alone or (t.key, *t.shape) in forms or (couples(t) and coupled & set(t.place))
-        ):
+    terms = [replace(standing.get(d.terms[k].key, d.terms[k]), reach=1.0) for k in fit.names]
+    for t in whole.terms:
+        closed = alone or (t.key, *t.shape) in forms or (couples(t) and coupled & set(t.place))
+        if not isinstance(t.effect, Slope) and (t.block or not closed):
             terms.append(t)
     varied = []
     for key in names:
@@ -370,8 +386,8 @@ def about(
             unit = 0.1 if name in ("x", "y", "z") else 0.3 * abs(value) + 1e-6
             slope = Slope(key[0], name, step)
             terms.append(Term(slope, key[1], block=f"slope {key} {name}", bound=1.0, unit=(unit,)))
-    moved = frozenset(part for t in _far(fit) for part in parts_of(t.place))
-    design = make_design(d.model, d.data_sets, [*terms, *varied], point, d, moved)
+    moved |= _parts_moved(fit)
+    design = make_design(d.model, d.data_sets, [*terms, *varied], point, whole, moved)
     if alone:
         design = replace(design, kept_of=d.competing)
     number = {t.identity: k for k, t in enumerate(design.terms)}
@@ -384,6 +400,10 @@ def about(
         fit, design=design, names=tuple(kept), scales=scales, omitted=frozenset(), negative=None
     )
     return same.lacking(gone)
+
+
+def _parts_moved(fit: Fit) -> frozenset[str]:
+    return frozenset(part for t in _far(fit) for part in parts_of(t.place))
 
 
 def _point(fit: Fit) -> list[Placed]:
