@@ -99,7 +99,10 @@ def equations_of(
     if np.isfinite(force).any():
         noise += sole_covariance(rigid, model.robot.chains, at, m.q, np.nan_to_num(force), SOLE)
     feet = Feet(stance.rows, stance.standing | stance.near, force, deviation)
-    known = stance.carried.determined
+    # Where a log begins or ends, nobody knows what a filter would have seen beyond.
+    ends = np.zeros((len(m), 1), np.bool_)
+    ends[[k for piece in m.pieces for k in (piece.start, piece.stop - 1)]] = True
+    known = stance.carried.determined & ~within(ends, m.pieces, _reach(m))[:, 0]
     return EquationsOfMotion(rigid, moved.motion, torque, noise, feet, at, known)
 
 
@@ -139,8 +142,12 @@ Told = tuple[Mask, Array]
 def told_of(m: Log, legs: int) -> Told:
     """By its stances, its attitude and the rates of it."""
     standing = np.ones((len(m), legs), np.bool_) if m.standing is None else m.standing
-    reach = int(np.ceil(REACH * m.rate / m.bandwidth)) if np.isfinite(m.bandwidth) else 0
-    return within(changes(standing, m.pieces), m.pieces, reach), _turning(m)
+    return within(changes(standing, m.pieces), m.pieces, _reach(m)), _turning(m)
+
+
+def _reach(m: Log) -> int:
+    """Samples that a filter carries a jump."""
+    return int(np.ceil(REACH * m.rate / m.bandwidth)) if np.isfinite(m.bandwidth) else 0
 
 
 def motion_of(model: MachineModel, m: Log, told: Told | None = None) -> Moved:

@@ -58,7 +58,7 @@ def test_payload_of_a_hexapod_that_walks(loaded, kind):
     share, near = (0.05, 0.01) if kind != "neither" else (0.15, 0.03)
     assert mass == pytest.approx(3.0, rel=share)
     assert np.abs(moment / mass - [0.12, 0.05]).max() < near
-    assert 0.7 < left_over(equations, LOAD) < 1.5
+    assert 0.6 < left_over(equations, LOAD) < 1.5
 
 
 @pytest.mark.slow
@@ -67,7 +67,7 @@ def test_quadrupeds_that_walk(name, tmp_path):
     robot, (kp, size, periods) = robot_of(name), ROBOTS[name]
     walk = walked(robot, periods=periods[:3], kp=kp, noise=0.15 * size)
     for kind in KINDS:
-        assert 0.6 < left_over(rows_of(*log_of(name, robot, walk, kind, tmp_path))) < 1.5
+        assert 0.45 < left_over(rows_of(*log_of(name, robot, walk, kind, tmp_path))) < 1.5
 
 
 def test_two_feet_need_what_the_base_turns_by(loaded):
@@ -75,7 +75,9 @@ def test_two_feet_need_what_the_base_turns_by(loaded):
     standing = np.array(m.standing) & (np.arange(6) < 2)
     m = replace(m, standing=standing, base_roll=None, base_pitch=None)
     assert not equations_of(model, m).known.any()
-    assert equations_of(model, replace(m, base_rate=np.zeros((len(m), 3)))).known.any()
+    known = equations_of(model, replace(m, base_rate=np.zeros((len(m), 3)))).known
+    assert known.any()
+    assert not known[[0, -1]].any()  # beyond its ends no filter sees
 
 
 @pytest.mark.parametrize(
