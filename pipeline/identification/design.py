@@ -2,9 +2,9 @@
 
 A column is the change of the prediction by one unit of a coordinate of an effect, a finite
 difference of the effect's own edit along the log, so that what a chain makes of a torque (current,
-voltage, losses above a shaft) is in it. Columns are made once about a point; every estimate, trial
-of a name and left-out chunk after that is a matter of sums X^T X, X^T r. Values count from the
-files' model, whatever the point.
+voltage, losses above a shaft) is in it; those of bodies on a fixed base are one regressor. Columns
+are made once about a point; every estimate, trial of a name and left-out chunk after that is a
+matter of sums X^T X, X^T r. Values count from the files' model, whatever the point.
 """
 
 from __future__ import annotations

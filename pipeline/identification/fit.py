@@ -238,17 +238,13 @@ class Fit:
     @cached_property
     def against(self) -> tuple[Index, Index]:
         """Columns against their sign, and those left out for it that would have theirs."""
-        x, wrong = self.solved[1], self.active[(self.solved[1] < 0.0) & ~self._signed]
+        x = self.solved[1]
+        wrong = self.active[(x < 0.0) & ~self.design.signed[self.active]]
         if self.negative is None:
             return wrong, wrong[:0]
         out = np.flatnonzero((self.negative & self.live)[self.offered])
         H, h = self._sums
         return wrong, self.offered[out[h[out] > H[out[:, None], self._use] @ x]]
-
-    @cached_property
-    def _signed(self) -> Mask:
-        """Active columns that may have either sign, (n,)."""
-        return self.design.signed[self.active]
 
     def without(self, number: int) -> Fit:
         """The same with one name less; settle it."""
@@ -291,18 +287,15 @@ class Fit:
         A, _, scale = self._less_chunks
         return np.asarray(np.linalg.inv(A) / (scale[:, :, None] * scale[:, None]))
 
-    def left_out(self, equations: Sequence[int]) -> Array:
-        """Squares of every chunk by estimates from the others, of some equations, (C, E)."""
-        return np.stack([self._chunk_losses[k] for k in equations], axis=1)
-
     @cached_property
-    def _chunk_losses(self) -> list[Array]:
+    def _chunk_losses(self) -> Array:
+        """Squares of every chunk by estimates from the others, of every equation, (C, E)."""
         out = []
         pairs = zip(self.design.equations, self._by_chunk, self._chunk_rests, strict=True)
         for e, (at, _, h), rest in pairs:
             x = self.from_others[:, self.active[at]]
             out.append(np.maximum(e.sums[1] - np.sum(x * (h + rest), axis=1), 0.0))
-        return out
+        return np.stack(out, axis=1)
 
     @cached_property
     def _chunk_rests(self) -> list[Array]:
@@ -314,7 +307,7 @@ class Fit:
         return out
 
     def _lost(self, columns: Index, equations: Sequence[int]) -> Array:
-        """The same where some active columns are nothing; scales and noise stay.
+        """Of some equations `_chunk_losses` where some active columns are nothing; scales stay.
 
         What other chunks make of the rest follows from the covariances at hand.
         """
@@ -324,7 +317,7 @@ class Fit:
         for k in equations:
             own, G, _ = self._by_chunk[k]
             change = (G @ v[:, own])[..., 0] + 2.0 * self._chunk_rests[k]
-            out.append(self._chunk_losses[k] + np.sum(v[:, own, 0] * change, axis=1))
+            out.append(self._chunk_losses[:, k] + np.sum(v[:, own, 0] * change, axis=1))
         return np.maximum(np.stack(out, axis=1), 0.0)
 
     def sure(self, less: Fit | Index, equations: Sequence[int]) -> tuple[float, float]:
@@ -339,13 +332,13 @@ class Fit:
         """
         own = list(equations)
         rows = np.array([self.design.equations[k].sums[2] for k in own]).T
-        mine = self.left_out(own)
-        other = less.left_out(own) if isinstance(less, Fit) else self._lost(less, own)
+        mine = self._chunk_losses[:, own]
+        here = less._chunk_losses[:, own] if isinstance(less, Fit) else self._lost(less, own)
         # With noise as large as what is left, so that no chunk has more say than its rows.
         noise = np.maximum(rows * self.floor[own] ** 2, 1e-300)
-        d = (rows * np.log((other + noise) / (mine + noise))).sum(axis=1)
+        d = (rows * np.log((here + noise) / (mine + noise))).sum(axis=1)
         error = float(np.sqrt(CHUNKS) * d.std(ddof=1))
-        rise, left = ((x * self.weights[own]).sum() for x in (other - mine, mine))
+        rise, left = ((x * self.weights[own]).sum() for x in (here - mine, mine))
         return float(d.sum()) / max(error, 1e-12), float(rise) / max(float(left), 1e-12)
 
     @cached_property
