@@ -523,8 +523,12 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
     answer, known = _likeliest(answer)
     beside = _beside_general(answer)
     if beside.better:  # the others as they are without
-        kept = frozenset(t.key for t in answer.told) - beside.better
-        answer = answered(answer.found, kept)
+        d, gone = answer.found.design, beside.better
+        # A law that they have in them may be a part of what has no name.
+        numbers = [k for k, t in enumerate(d.terms) if t.key in gone and not t.block]
+        inside = {d.terms[w].key for k in numbers for w in d.within(k)}
+        kept = frozenset(t.key for t in answer.told) | inside
+        answer = answered(answer.found, kept - gone)
         known = {one.key: rivals_of(answer, one) for one in answer.told}
         beside = replace(_beside_general(answer), better=beside.better)
     noise, open_ = noise_left(answer.fit, floor_of(measurements))

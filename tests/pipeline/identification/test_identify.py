@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pipeline.effects.base import effect_named
-from pipeline.identification.answer import answered, identify
+from pipeline.identification import answer
+from pipeline.identification.answer import Beside, answered, identify
 from pipeline.identification.design import Term, make_data_sets, make_design
 from pipeline.identification.fit import settled, start_fit
 from pipeline.identification.offered import block_terms
@@ -155,6 +156,17 @@ def test_what_only_proves_has_no_say(motion):
     for one, other in zip(first.found, second.found, strict=True):
         assert (one.key, one.level, one.rivals) == (other.key, other.level, other.rivals)
         assert one.values == pytest.approx(other.values, rel=1e-4)
+
+
+def test_what_a_law_without_a_name_leaves_of_one_is_the_law_within(motion, monkeypatch):
+    nominal, law = leg.leg_model(), ("stribeck_friction", J2)
+    values = {"coulomb": 0.6, "excess": 0.2, "velocity": 0.06}
+    truth = effect_named(law[0]).apply(nominal, J2, values)
+    unnamed = Beside(frozenset(), frozenset({law}), frozenset())
+    monkeypatch.setattr(answer, "_beside_general", lambda _: unnamed)
+    found = identify(nominal, [leg.only(leg.measured(truth, motion), ("current",))]).found
+    assert ("coulomb_friction", J2) in {f.key for f in found if f.kept}
+    assert law in {f.key for f in found if not f.kept}
 
 
 def swinging(motion, folder, name, place, values):
