@@ -155,17 +155,22 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
 
 
 def polished(fit: Fit) -> Fit:
-    """The likeliest set on columns about its own estimates."""
+    """The likeliest set on columns about its own estimates.
+
+    A set that is likelier on columns about another one may owe that to products of the two: a gain,
+    say, scales the ripple about which its column was made.
+    """
+    best: Fit | None = None
     for _ in range(_ROUNDS):
         fit = settled(refreshed(fit))
-        if not (is_far(fit) or any(fit.design.terms[k].free for k in fit.names)):
-            return climbed(fit)
-        again = climbed(arrived(fit))
-        same = keys_of(again) == keys_of(fit)
-        fit = again
-        if same and not is_far(fit):
-            break
-    return fit
+        moved = is_far(fit) or any(fit.design.terms[k].free for k in fit.names)
+        there = arrived(fit) if moved else fit
+        if best is not None and likeliest([there, best]) is best:
+            return best
+        best, fit = there, climbed(there)
+        if not moved or (keys_of(fit) == keys_of(there) and not is_far(fit)):
+            return fit
+    return likeliest([arrived(fit), there])
 
 
 def keys_of(fit: Fit) -> frozenset[Key]:

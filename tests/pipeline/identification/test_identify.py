@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from pipeline.effects.base import effect_named
-from pipeline.identification import answer
+from pipeline.identification import answer, search
 from pipeline.identification.answer import Beside, answered, identify
 from pipeline.identification.design import Term, make_data_sets, make_design
 from pipeline.identification.fit import settled, start_fit
 from pipeline.identification.offered import block_terms
 from pipeline.identification.results import APPROXIMATE, CONFIRMED
-from pipeline.identification.search import about, is_far
+from pipeline.identification.search import about, is_far, keys_of, polished
 from pipeline.logs.log import TEST
 from pipeline.simulation.machine import read_machine
 from pipeline.simulation.predict import Simulator
@@ -200,7 +200,7 @@ def test_what_only_a_product_shows_is_one_class_at_one_level(motion, tmp_path, n
     assert {name, "rigid_body_parameters"} <= told
 
 
-def test_a_payload_goes_where_a_log_shows_it_and_nowhere_else(motion, tmp_path):
+def test_a_payload_goes_where_a_log_shows_it_and_nowhere_else(motion, tmp_path, monkeypatch):
     """Its columns of a pendulum hold what it would change along the link, about the files."""
     place, at = "pendulum_link", {"mass": 0.05, "x": 0.02, "y": 0.01, "z": -0.06}
     nominal, log = swinging(motion, tmp_path, "link_mass", place, at)
@@ -215,6 +215,9 @@ def test_a_payload_goes_where_a_log_shows_it_and_nowhere_else(motion, tmp_path):
     for _ in range(4):
         fit = settled(about(fit))
     assert not is_far(fit)
+    # What steps make of it stands where it is likelier on columns of its own.
+    monkeypatch.setattr(search, "climbed", lambda other: settled(replace(other, names=())))
+    assert keys_of(polished(fit)) == {payload.key}
     (k,) = fit.names
     mass, there = fit.x[fit.design.columns[k]][0], fit.design.terms[k].shape
     moments = [mass * there[axis] for axis in "xyz"]
