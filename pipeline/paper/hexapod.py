@@ -109,10 +109,15 @@ class Outcome:
         return self.chain.holding(self.demand.standing)
 
     @cached_property
+    def energy(self) -> tuple[Array, Array]:
+        """E_el(+) and E_el(-) per cycle by set and leg, (W, 2) each [J]."""
+        forward, reverse = split_integral(self.demand.series.time, self.walking.electrical_power)
+        return by_leg(forward).sum(axis=2), by_leg(reverse).sum(axis=2)
+
+    @property
     def drawn(self) -> Array:
         """E_el(+) per cycle by set and leg, (W, 2) [J]: what flows back is lost."""
-        forward, _ = split_integral(self.demand.series.time, self.walking.electrical_power)
-        return np.asarray(by_leg(forward).sum(axis=2))
+        return self.energy[0]
 
     @cached_property
     def excess(self) -> dict[str, Array]:
