@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from pipeline.robot.kinematics import leg_posture
 from pipeline.robot.robot import Robot
+from tests.blind.machines.machine import Course
 from tests.blind.machines.own import gait_course
 
 mujoco = pytest.importorskip("mujoco")
@@ -37,7 +39,8 @@ class Walked:
 def walked(
     robot: Robot,
     *,
-    periods: tuple[float, ...],
+    periods: tuple[float, ...] = (),
+    squats: float = 0.0,
     payload: tuple[float, tuple[float, float, float]] = (0.0, (0.0, 0.0, 0.0)),
     centre: float = 0.0,
     tilt: float = 0.0,
@@ -46,7 +49,7 @@ def walked(
     kp: float = KP,
     noise: float = TORQUE_NOISE,
 ) -> Walked:
-    """Let it walk cycles of these periods [s].
+    """Let it walk cycles of these periods [s], or stand and go slowly down and up so long [s].
 
     `payload`: mass [kg] and its place on the base [m]. `centre`: by how much the base's centre of
     mass lies further ahead [m]. `tilt`: of the ground about the lateral axis [rad]. `coulomb`,
@@ -54,7 +57,7 @@ def walked(
     servos [N*m/rad]. `noise`: of torques [N*m].
     """
     kd = kp * KD / KP
-    course = gait_course(robot, periods, STEP)
+    course = squatting(robot, squats) if squats else gait_course(robot, periods, STEP)
     model = _model(robot, payload, coulomb or {}, (kp, kd))
     model.body_ipos[model.body(robot.spec.robot.base_link).id, 0] += centre
     model.opt.gravity[:] = np.linalg.norm(model.opt.gravity) * np.array(
@@ -90,6 +93,26 @@ def walked(
     scale = np.array([(gain or {}).get(name, 1.0) for name in robot.joints])
     torque = scale * torque + rng.normal(0.0, noise, torque.shape)
     return Walked(course.time[::EVERY], np.round(q / count) * count, torque, force, turn)
+
+
+def squatting(robot: Robot, duration: float, depth: float = 0.15) -> Course:
+    """Standing so long [s] while the base goes down and up, twice slowly and twice faster."""
+    first = gait_course(robot, (2.0,), STEP).q[0]
+    time = np.arange(round(duration / STEP)) * STEP
+    phase = np.where(time < duration / 2, 1.0, 2.0) * 4.0 * np.pi * time / duration
+    high = -float(leg_posture(robot.chains, robot.chains.by_leg(first[None])).feet[..., 2].mean())
+    height = -0.5 * depth * high * (1.0 - np.cos(phase))
+    q = np.empty((time.size, first.size))
+    q[0] = first
+    for k in range(1, time.size):
+        legs = leg_posture(robot.chains, robot.chains.by_leg(q[k - 1][None]))
+        feet, own = legs.feet, legs.jacobians
+        rise = np.zeros((*feet.shape[1:], 1))
+        rise[:, 2] = -(height[k] - height[k - 1])
+        step = np.linalg.solve(own[0], rise)[..., 0]
+        q[k] = q[k - 1] + robot.chains.by_joint(step[None])[0]
+    v = np.gradient(q, STEP, axis=0)
+    return Course(time, q, v, np.gradient(v, STEP, axis=0))
 
 
 def spec_of(root: ET.Element, robot: Robot, *, balanced: bool) -> mujoco.MjSpec:

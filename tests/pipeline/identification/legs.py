@@ -1,4 +1,4 @@
-"""Robots that walk in MuJoCo, one thing hidden: logs for `gap`, and who found what.
+"""Robots that walk and stand in MuJoCo, one thing hidden: logs for `gap`, and who found what.
 
 python -m tests.pipeline.identification.legs --out DIR [--only hexapod] [--hidden payload]
 """
@@ -47,7 +47,7 @@ def robot_of(name: str) -> Robot:
     return load_robot(load_robot_file(Path("urdf") / f"{name}.toml"))
 
 
-def made(name: str, hidden: str) -> Walked:
+def made(name: str, hidden: str, motion: str) -> Walked:
     """A log with one thing hidden."""
     robot, (kp, size, periods) = robot_of(name), ROBOTS[name]
     mass = sum(body.mass for body in robot.model.inertias)
@@ -59,7 +59,8 @@ def made(name: str, hidden: str) -> Walked:
         "gain": {"gain": {robot.joints[2]: 0.9}},
         "coulomb": {"coulomb": dict.fromkeys(robot.joints[1::3], 2.0 * size)},
     }[hidden]
-    return walked(robot, periods=periods, **own, kp=kp, noise=0.15 * size)
+    walks = {"periods": periods} if motion == "walk" else {"squats": 24.0}
+    return walked(robot, **walks, **own, kp=kp, noise=0.15 * size)
 
 
 def frame_of(robot: Robot, log: Walked, kind: str) -> pd.DataFrame:
@@ -118,17 +119,17 @@ def main() -> None:
 
     parser = argparse.ArgumentParser()
     parser.add_argument("--out", type=Path, required=True)
-    choices = {"only": ROBOTS, "hidden": HIDDEN, "kinds": KINDS}
+    choices = {"only": ROBOTS, "hidden": HIDDEN, "motions": ("walk", "stand"), "kinds": KINDS}
     for name, every in choices.items():
         parser.add_argument(f"--{name}", nargs="+", default=[*every])
     asked = vars(parser.parse_args())
     out: Path = asked.pop("out")
     out.mkdir(parents=True, exist_ok=True)
     rows, walk = [], lru_cache(maxsize=1)(made)
-    for name, hidden, kind in product(*(asked[key] for key in choices)):
-        robot, path = robot_of(name), out / f"{name}_{hidden}_{kind}.parquet"
+    for name, hidden, motion, kind in product(*(asked[key] for key in choices)):
+        robot, path = robot_of(name), out / f"{name}_{hidden}_{motion}_{kind}.parquet"
         if not path.is_file():
-            frame_of(robot, walk(name, hidden), kind).to_parquet(path)
+            frame_of(robot, walk(name, hidden, motion), kind).to_parquet(path)
         begun = time.process_time()
         try:
             found = gap(path, load(Path("urdf") / f"{name}.toml")).found
@@ -138,9 +139,9 @@ def main() -> None:
         except LegwattError as error:
             verdict, said = "refused", str(error)
         took = round(time.process_time() - begun, 1)
-        rows.append((name, hidden, kind, verdict, took, said[:600]))
+        rows.append((name, hidden, motion, kind, verdict, took, said[:600]))
         print(*rows[-1], sep=" | ", flush=True)
-    columns = ["robot", "hidden", "kind", "verdict", "cpu_s", "said"]
+    columns = ["robot", "hidden", "motion", "kind", "verdict", "cpu_s", "said"]
     pd.DataFrame(rows, columns=columns).to_csv(out / "legs.csv", index=False)
 
 
