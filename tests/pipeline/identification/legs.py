@@ -102,6 +102,11 @@ def judged(robot: Robot, hidden: str, found: pd.DataFrame) -> str:
     A class is right where one of its members is.
     """
     told = found[found["written"] == True] if len(found) else found  # noqa: E712
+    if len(told):  # bodies are one name, at all links whose tolerances moved beside a loose one
+        places = told.groupby(["effect", "order"])["place"].transform(
+            lambda p: " ".join(p.unique())
+        )
+        told = told.assign(place=places).drop_duplicates(["effect", "place"])
     pattern = RIGHT.get(hidden, "$^").format(third=robot.joints[2])
     names = [f"{r.effect} {r.place}: {r.reason}" for r in told.itertuples()]
     good = [bool(re.search(pattern, n)) for n in names]
