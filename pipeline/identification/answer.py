@@ -409,14 +409,14 @@ def _traded(less: Fit, fit: Fit, one: Told) -> Iterator[Rival]:
         one: A name that changes bodies; any other has none.
     """
     d, held, links = fit.design, replace(less, sigma=fit.sigma), fit.design.model.robot.links
-    changed = {t.place[0] for t in d.terms if t.block in fit.loose} if one.key == BODIES else set()
-    changed |= {part for part in one.key[1] if part in links}
+    changed = _loose(fit) if one.key == BODIES else {p for p in one.key[1] if p in links}
+    if not changed:
+        return
     # All joints have such laws: they cost nothing.
     laws = [k for k, t in enumerate(d.terms) if t.block and t.effect.name in _LIKE_BODIES]
     at = {(links[link],) for link in changed}
     laws = [k for k in laws if d.terms[k].place in at and not fit.x[d.columns[k]].any()]
-    every = offered(fit, frozenset()) if changed else []
-    numbers = [k for k in every if d.terms[k].place[0] not in links]
+    numbers = [k for k in offered(fit, frozenset()) if d.terms[k].place[0] not in links]
     gains = [*fit.gains(numbers).tolist(), *(0.0 for _ in laws)]
     for k, gain in zip([*numbers, *laws], gains, strict=True):
         columns = d.columns[k]
@@ -425,6 +425,11 @@ def _traded(less: Fit, fit: Fit, one: Told) -> Iterator[Rival]:
         if left < (SHARE * shown if k in laws else 1.0) and shown > COVER**2:
             more = fit if k in laws else replace(fit, names=(*fit.names, k))
             yield Rival(d.terms[k].key, -gain, gain, False, False, more)
+
+
+def _loose(fit: Fit) -> set[str]:
+    """Links whose bodies may be anything."""
+    return {t.place[0] for t in fit.design.terms if t.block in fit.loose}
 
 
 def _foreseen(less: Fit, fit: Fit, one: Told) -> tuple[list[Move], list[Move]]:
@@ -454,8 +459,8 @@ def _foreseen(less: Fit, fit: Fit, one: Told) -> tuple[list[Move], list[Move]]:
         share = 1.0 - wide.beside(columns, x) / less.beside(columns, x)
         twins.append((share, less.names, wide.loose))
     # Whatever else changes a loose link is a body of that kind.
-    loose = {t.place[0] for t in d.terms if t.block in fit.loose} if bodies else set[str]()
-    kinds = {k for k in numbers if d.terms[k].place[:1] and d.terms[k].place[0] in loose}
+    loose = _loose(fit) if bodies else set[str]()
+    kinds = {k for k in numbers if not loose.isdisjoint(d.terms[k].place)}
     twins = [m for m in twins if m[0] > SHARED or kinds & set(m[1])]
     twins.sort(key=lambda m: -m[0])
     return likely, twins[:_RIVALS]

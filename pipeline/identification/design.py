@@ -21,7 +21,7 @@ from actuators.arrays import Array, Index, Mask
 from actuators.errors import LegwattError
 from pipeline.effects.base import Effect, Place
 from pipeline.identification.settings import CHUNKS, MARGIN, SHARE
-from pipeline.identification.tolerances import BodyStrain, Slope, Tolerance, inertial
+from pipeline.identification.tolerances import BodyStrain, Slope, Tolerance, inertial, slope
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.equations import Left, OnLegs
@@ -733,9 +733,7 @@ def _of_strains(data_set: DataSet, base: Prediction, term: Term) -> list[dict[in
     model, size = base.model, len(term.effect.coordinates)
     joint = model.carrier(term.place[0])
     now = np.array(model.bodies.body(joint).strain or (0.0,) * size)
-    steps = np.diag([c.step for c in term.effect.coordinates])
-    law = inertial(model, term.place[0])
-    ten = np.asarray(np.linalg.solve(steps, law(now + steps) - law(now)).T, float)
+    ten = slope(inertial(model, term.place[0]), now)
     seen = data_set.simulator.of_body(base, model.rigid.getJointId(joint), ten)
     if seen is None:
         return None

@@ -28,15 +28,13 @@ import scipy.optimize
 from actuators.arrays import Array, Index, Mask
 from pipeline.identification.design import Design
 from pipeline.identification.settings import CHUNKS, LOOSE
-from pipeline.identification.tolerances import BodyStrain, Slope
+from pipeline.identification.tolerances import Slope
 
 #: Prior scale at which a block is nothing.
 NOTHING: Final = 1e-4
 #: Turns of the updates of scales and noise, at most.
 _TURNS: Final = 15
 _RIDGE: Final = 1e-10
-#: Change of the evidence, and of a scale's logarithm, that is none.
-_CONVERGED: Final = 0.1
 #: Turns at which blocks are tried as nothing, and those that are nothing at this scale.
 _REVIEWED: Final = (0, 4, 10)
 _REVIVED: Final = 0.03
@@ -479,7 +477,7 @@ def settled(fit: Fit, turns: int = _TURNS) -> Fit:
         spare = np.maximum(fit.kappa * rows - fit.determined, 0.1 * fit.kappa * rows + 1e-9)
         sigma = np.sqrt(fit.kappa * fit.misfit / spare)
         fit = replace(fit, scales=scales, sigma=np.maximum(sigma, np.maximum(fit.floor, 1e-12)))
-        if change < _CONVERGED and abs(fit.evidence - before) < _CONVERGED:
+        if change < 0.1 and abs(fit.evidence - before) < 0.1:
             break
         before = fit.evidence
     return _right_signs(fit)
@@ -495,10 +493,7 @@ def _reviewed(fit: Fit, bounds: Mapping[str, float]) -> Fit:
         ids = pool[d.block_of[pool] == d.blocks.index(b)]
         if trial == now or not ids.size:
             continue
-        # A body comes and goes by more than what the evidence is converged to.
-        body = isinstance(d.terms[d.owner[ids[0]]].effect, BodyStrain)
-        least = _CONVERGED if body else 0.0
-        if fit.with_prior(ids, trial * d.unit[ids]) > least:
+        if fit.with_prior(ids, trial * d.unit[ids]) > 0.0:
             scales = {**fit.scales, b: trial}
             fit = _right_signs(replace(fit, scales=scales))
     return fit

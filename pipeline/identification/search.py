@@ -170,7 +170,7 @@ def polished(fit: Fit) -> Fit:
         best, fit = there, climbed(there)
         if not moved or (keys_of(fit) == keys_of(there) and not is_far(fit)):
             return fit
-    return likeliest([arrived(fit), there])
+    return likeliest([arrived(fit), best]) if best else fit
 
 
 def keys_of(fit: Fit) -> frozenset[Key]:
